@@ -68,6 +68,8 @@ def case_of(seed: int) -> Case:
             neighbours_failed=3,
             removed="nothing",
             versions=(),
+            system_sha256="",
+            simulator_sha256="",
         ),
         limits=Limits(),
     )

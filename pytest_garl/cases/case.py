@@ -83,7 +83,7 @@ class Evidence:
     signature, or by the same kind of body if the entry of a crossing object was shifted;
     ``trajectory_sha256`` is that of the flight, on CPUs of the class ``cpu``; ``removed`` says what
     shrinking removed.  ``system_sha256`` and ``simulator_sha256`` are hashes of the sources that
-    flew it; empty in files of earlier versions.
+    flew it.
     """
 
     trajectory_sha256: str
@@ -93,8 +93,8 @@ class Evidence:
     neighbours_failed: int
     removed: str
     versions: tuple[tuple[str, str], ...]
-    system_sha256: str = ""
-    simulator_sha256: str = ""
+    system_sha256: str
+    simulator_sha256: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,8 +190,8 @@ class Case:
     case gates nothing.  ``live`` is whether a repair must also hold against objects that a live
     policy moves: an escape from them exists.  ``limits`` are those of the tests when it was found;
     pytest flies it with those of today.  ``accepted`` marks a case as known in projects without
-    git.  ``severity`` is what the violation takes; empty in files of earlier versions.  ``worst``
-    bounds the violations that it excuses; None in files of earlier versions, which set no bound.
+    git.  ``severity`` is what the violation takes.  ``worst`` bounds the violations that it
+    excuses; None sets no bound: for the own assertion of a test nothing is measured.
     """
 
     system: str
@@ -284,7 +284,7 @@ class Case:
             f"genes={scenario.genes!r}, absent={scenario.removed_objects!r}), "
             f"{self.violation.signature!r}, {self.moves!r}, {self.asserting_test!r})"
         )
-        # Empty without changes, so that cases from before they were recorded keep their names.
+        # The ids of committed cases depend on it: of those without changes it is empty.
         changes = repr(self.changes) if self.changes else ""
         worst = self.worst
         bound = f"({worst.margin!r}, {worst.grade!r}, {self.reason!r})" if worst else ""

@@ -5,7 +5,6 @@ The sections stand in the file in the order of the functions here.
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -20,7 +19,6 @@ from pytest_garl.cases.case import (
     Evidence,
     MoveList,
     Moves,
-    NoGateReason,
     Preventable,
     Prevention,
     RecordedBehaviour,
@@ -28,10 +26,9 @@ from pytest_garl.cases.case import (
     Worst,
 )
 from pytest_garl.cases.case_header import (
-    FIRST_SCHEMA,
+    HEADER_KEYS,
     CaseHeader,
     header_lines,
-    keys_of,
     read_header,
 )
 from pytest_garl.errors import ScenarioError
@@ -47,7 +44,6 @@ from pytest_garl.scenarios.story import GRADES
 from pytest_garl.scenarios.task import task_lines
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S
 from pytest_garl.verdicts.verdict import (
-    DEFAULT_LIMITS,
     FARTHEST_M,
     LONGEST_S,
     AbortRule,
@@ -111,7 +107,7 @@ def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case
     """Return the case in ``text``; raise ScenarioError that names source and key."""
     top = Table(parse(text, source), source)
     header = read_header(top)
-    top.refuse_unknown(keys_of(header) | _SECTIONS | {*SCENARIO_KEYS})
+    top.refuse_unknown(HEADER_KEYS | _SECTIONS | {*SCENARIO_KEYS})
     try:
         map = load_map(header.map)
     except ScenarioError as error:
@@ -121,7 +117,6 @@ def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case
     names = [name for name, _ in map.all_objects if name not in removed]
     policy = top.table("policy")
     policy.refuse_unknown({"name", "sha256"})
-    evidence = _read_evidence(top.table("evidence"))
     return Case(
         system=header.system,
         status=header.status,
@@ -132,12 +127,12 @@ def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case
         policy_sha256=policy.string("sha256"),
         moves=read_moves(top.table("moves"), names),
         changes=read_changes(top.table("changes"), names) if "changes" in top.values else (),
-        evidence=evidence,
-        limits=_read_limits_of(header.schema, top.table("limits")),
+        evidence=_read_evidence(top.table("evidence")),
+        limits=read_limits(top.table("limits")),
         test=top.string("test", ""),
         assertion=top.string("assertion", ""),
         accepted=top.boolean("accepted", default=False),
-        reason=_reason(header, evidence),
+        reason=header.reason,
         live=header.live,
         prevention=_read_prevention(top),
         severity=read_severity(top),
@@ -153,13 +148,6 @@ def size_of(case: Case, map: Map) -> int:
     """Return how many characters the scenario and the recorded behaviour take in the file."""
     lines = (*scenario_lines(case.scenario, map), *record_lines(case))
     return sum(len(line) for line in lines)
-
-
-def _reason(header: CaseHeader, evidence: Evidence) -> NoGateReason:
-    """Return why a case gates nothing; the first schema tells an edge by the evidence alone."""
-    if header.schema == FIRST_SCHEMA and evidence.neighbours_failed < evidence.neighbours:
-        return "edge"
-    return header.reason
 
 
 def _prevention_lines(prevention: Prevention) -> list[list[str]]:
@@ -254,18 +242,6 @@ def _limits_lines(limits: Limits) -> list[str]:
     ]
 
 
-def _read_limits_of(schema: int, table: Table) -> Limits:
-    """Return the limits of a case.
-
-    In the first schema "ok" was the default and nobody's choice, so today's default takes its
-    place; a test that flies the case has limits of its own.
-    """
-    found = read_limits(table)
-    if schema == FIRST_SCHEMA and found.abort == "ok":
-        return dataclasses.replace(found, abort=DEFAULT_LIMITS.abort)
-    return found
-
-
 def read_limits(table: Table) -> Limits:
     """Return the limits in a table of their own."""
     table.refuse_unknown({"distance_m", "time_s", "abort"})
@@ -305,10 +281,6 @@ def _behaviour_lines(case: Case) -> list[list[str]]:
 
 
 def _evidence_lines(evidence: Evidence) -> list[list[str]]:
-    sources = {
-        "system_sha256": evidence.system_sha256,
-        "simulator_sha256": evidence.simulator_sha256,
-    }
     return [
         [
             "[evidence]",
@@ -318,7 +290,8 @@ def _evidence_lines(evidence: Evidence) -> list[list[str]]:
             f"neighbours = {evidence.neighbours}  # slightly different scenarios flown",
             f"neighbours_failed = {evidence.neighbours_failed}",
             f"removed = {quoted(evidence.removed)}",
-            *(f'{key} = "{value}"' for key, value in sources.items() if value),
+            f"system_sha256 = {quoted(evidence.system_sha256)}",
+            f"simulator_sha256 = {quoted(evidence.simulator_sha256)}",
         ],
         [
             "[evidence.versions]",
@@ -339,8 +312,8 @@ def _read_evidence(table: Table) -> Evidence:
         neighbours_failed=table.integer("neighbours_failed"),
         removed=table.string("removed"),
         versions=tuple((name, versions.string(name)) for name in versions.values),
-        system_sha256=table.string("system_sha256", ""),
-        simulator_sha256=table.string("simulator_sha256", ""),
+        system_sha256=table.string("system_sha256"),
+        simulator_sha256=table.string("simulator_sha256"),
     )
 
 
@@ -496,7 +469,7 @@ def read_severity(top: Table) -> Severity:
         table.refuse_unknown(_OF_CONDITIONS)
         conditions = tuple(table.strings("conditions"))
         values = _read_names(table, "values")
-        if values and len(values) != len(conditions):
+        if len(values) != len(conditions):
             expected = f"one text for each of {len(conditions)} conditions"
             raise table.error("values", f"found {len(values)} texts, expected {expected}")
         return Severity(

@@ -14,22 +14,18 @@ from pytest_garl.scenarios.files import absent_line
 from pytest_garl.scenarios.maps.map import Map
 
 SCHEMA = 2
-FIRST_SCHEMA = 1
-"""Files of it are read; new ones are written in today's schema."""
-_KEYS = {"schema", "system", "status", "accepted", "map", "seed", "test", "assertion"}
-_KEYS_OF_SCHEMA = {1: {"avoidable"}, 2: {"gates", "reason", "live"}}
+HEADER_KEYS = frozenset(
+    {"schema", "system", "status", "accepted", "gates", "reason", "live", "map", "seed", "test"}
+    | {"assertion"}
+)
+"""Keys that may stand above the first table."""
 _WIDTH = 98
-_STATUSES: dict[int, dict[str, Status]] = {
-    1: {"open": "open", "fixed": "fixed", "unavoidable": "open"},
-    2: {"open": "open", "fixed": "fixed"},
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseHeader:
     """The facts above a file's first table, which decide the items that fly the case."""
 
-    schema: int
     system: str
     status: Status
     live: bool
@@ -37,11 +33,6 @@ class CaseHeader:
     map: str
     test: str
     asserting_test: str
-
-
-def keys_of(header: CaseHeader) -> set[str]:
-    """Return the keys that may stand above the first table."""
-    return _KEYS | _KEYS_OF_SCHEMA[header.schema]
 
 
 def header_lines(case: Case, map: Map) -> list[str]:
@@ -68,28 +59,18 @@ def header_lines(case: Case, map: Map) -> list[str]:
 
 def read_header(top: Table) -> CaseHeader:
     """Return the header; raise ScenarioError that names the key."""
-    schema = top.integer("schema")
-    if schema not in _KEYS_OF_SCHEMA:
-        expected = f"expected {FIRST_SCHEMA} or {SCHEMA}"
-        raise top.error("schema", f"found {shown(top.get('schema'))}, {expected}")
+    if top.integer("schema") != SCHEMA:
+        raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
     system = top.string("system")
     if not SYSTEM_NAME.fullmatch(system):
         raise top.error(
             "system", f"found {shown(system)}, expected 'module:class', names with dots between"
         )
-    statuses = _STATUSES[schema]
-    status = top.string("status", allowed=tuple(statuses))
-    if schema == FIRST_SCHEMA:
-        live = top.string("avoidable", allowed=("live", "recorded", "no")) == "live"
-        reason: NoGateReason = "unpreventable" if status == "unavoidable" else ""
-    else:
-        live, reason = top.boolean("live", default=False), _read_reason(top)
     return CaseHeader(
-        schema=schema,
         system=system,
-        status=statuses[status],
-        live=live,
-        reason=reason,
+        status=cast(Status, top.string("status", allowed=get_args(Status))),
+        live=top.boolean("live", default=False),
+        reason=_read_reason(top),
         map=top.string("map"),
         test=top.string("test", ""),
         asserting_test=asserting_test(top.string("test", ""), top.string("assertion", "")),

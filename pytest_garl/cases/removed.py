@@ -13,7 +13,6 @@ from pytest_garl.scenarios.scenario import Scenario
 NOTHING = "nothing"
 _OBJECTS = re.compile(r"(\d+) of (\d+) objects?")
 _CONDITIONS = re.compile(r"(\d+) of (\d+) conditions?(?: \((\d+) of (\d+) values\))?")
-_THEN = "; then "
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,22 +99,20 @@ class Removed:
 def all_removed(before: str, after: str) -> str:
     """Return in words what shrinking removed, this time and the times before.
 
-    A text of an earlier version stays as it is, and what was removed since stands behind it.
+    A text without counts adds nothing: a person may have changed it.
     """
     if NOTHING in (before, after):
         return after if before == NOTHING else before
-    earlier, _, last = before.rpartition(_THEN)
-    first, second = Removed.parse(last), Removed.parse(after)
+    first, second = Removed.parse(before), Removed.parse(after)
     if first is None or second is None:
-        return f"{before}{_THEN}{after}"
+        return after
     one, two = first.removed, second.removed
     removed = Contents(
         objects=one.objects + two.objects,
         conditions=one.conditions + two.conditions,
         values=one.values + two.values,
     )
-    text = Removed(removed=removed, there=first.there).text
-    return f"{earlier}{_THEN}{text}" if earlier else text
+    return Removed(removed=removed, there=first.there).text
 
 
 def _counted(number: int, noun: str) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Literal, Self
 
@@ -216,19 +215,10 @@ def stale_reasons(case: Case, sources: SourceHashes, trajectory_sha256: str) -> 
     found = []
     if sources.map_sha256 != evidence.map_sha256:
         found.append(f"the map {case.scenario.map!r} has changed")
-    if evidence.simulator_sha256:
-        if sources.simulator_sha256 != evidence.simulator_sha256:
-            found.append("the simulator has changed")
-    else:
-        found += _other_version(case)
+    if sources.simulator_sha256 != evidence.simulator_sha256:
+        found.append("the simulator has changed")
     if not found and evidence.system_sha256 == sources.system_sha256:
         found.append(
             "the flight is another, but neither the landing system nor the simulator has changed"
         )
     return tuple(found)
-
-
-def _other_version(case: Case) -> list[str]:
-    """Return the change of version, for a case that has no hash of the simulator's sources."""
-    then, today = dict(case.evidence.versions).get("pytest-garl", ""), version("pytest-garl")
-    return [f"pytest-garl was {then} and is {today}"] if then and then != today else []

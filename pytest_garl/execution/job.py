@@ -118,9 +118,6 @@ class FlightJob:
 def parse_job(text: str) -> FlightJob:
     """Return the job in ``text``; raise LedgerError for a damaged one."""
     try:
-        values = parse_json(text)
-        # Jobs of earlier versions let nobody take over.
-        given = {"takeover": None} | values if isinstance(values, dict) else values
-        return dataclass_from(FlightJob, given)
+        return dataclass_from(FlightJob, parse_json(text))
     except ValueError as error:
         raise LedgerError(f"a job in the ledger is damaged: {error}. {REMEDY}") from error

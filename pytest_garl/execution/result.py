@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -28,8 +27,7 @@ class FlightResult:
     ``off_marker_m`` is the distance of a touchdown too far from the marker before the UAV gave up.
     ``closest_call`` is the signature that a near miss would have had, ``closest_body`` the body
     of that near miss; both are empty without one.  ``landed_s`` is the time of the touchdown of a
-    flight that landed.  ``severity`` is what a violation took; None without a violation, and in
-    ledgers of earlier versions.
+    flight that landed.  ``severity`` is what a violation took; None without a violation.
     """
 
     outcome: str
@@ -64,24 +62,15 @@ class FlightResult:
 
     @classmethod
     def from_json(cls, values: Any) -> Self:
-        """Return the result whose :meth:`to_json` gave ``values``; unknown keys are left out.
+        """Return the result whose :meth:`to_json` gave ``values``.
 
         Raises ValueError that names the field, what was found and what was expected.
         """
-        if isinstance(values, Mapping):
-            values = {**_DEFAULTS} | {key: value for key, value in values.items() if key in _FIELDS}
-            if isinstance(values["severity"], Mapping):
-                values["severity"] = {**_SEVERITY_DEFAULTS, **values["severity"]}
         return dataclass_from(cls, values)
 
     def dumps(self) -> str:
         """Return the text that the ledger holds: the same bytes for equal results."""
         return json.dumps(self.to_json(), sort_keys=True, allow_nan=False)
-
-
-_DEFAULTS: Mapping[str, Any] = {"off_marker_m": None, "landed_s": None, "severity": None}
-_SEVERITY_DEFAULTS: Mapping[str, Any] = {"values": [], "unread": [], "untried": []}
-_FIELDS = frozenset(field.name for field in dataclasses.fields(FlightResult))
 
 
 def parse_result(text: str) -> FlightResult:

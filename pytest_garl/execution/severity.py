@@ -34,10 +34,10 @@ class Severity:
     not measured.
 
     Of conditions: ``conditions`` are active, objects that are there included; ``values`` say for
-    each which of its values are not nominal, or how many, and are empty in files of earlier
-    versions; ``largest_share`` (0..1) is how far the strongest lies from nominal, as a share of all
-    that can be flown; ``largest`` says it in words.  ``unread`` are those of the conditions that
-    change only data which the landing system never read: no text names them.
+    each which of its values are not nominal, or how many; ``largest_share`` (0..1) is how far the
+    strongest lies from nominal, as a share of all that can be flown; ``largest`` says it in words.
+    ``unread`` are those of the conditions that change only data which the landing system never
+    read: no text names them.
 
     ``untried`` names conditions and objects of a saved case of which shrinking did not try whether
     the violation needs them.
@@ -106,8 +106,7 @@ class Severity:
     @property
     def acting(self) -> list[tuple[str, str]]:
         """Return (name, value) of the conditions that may have acted."""
-        values = self.values or ("",) * len(self.conditions)
-        pairs = zip(self.conditions, values, strict=True)
+        pairs = zip(self.conditions, self.values, strict=True)
         return [(name, value) for name, value in pairs if name not in self.unread]
 
     @property

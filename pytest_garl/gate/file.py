@@ -21,8 +21,6 @@ from pytest_garl.scenarios.task import Task, read_task, task_lines
 from pytest_garl.verdicts.verdict import Limits
 
 SCHEMA = 2
-"""Files of schema 1 lack why a flight ended without landing, distances and times, and they call a
-landing that was given up "aborted".  They are read too."""
 LARGEST_BYTES = 4 * MEGABYTE
 """About six thousand flights, each a line of 600 bytes.  Reading TOML takes up to a hundred times
 as much memory."""
@@ -40,7 +38,6 @@ _KEYS = {
     "task",
     "flights",
 }
-_RENAMED = {"aborted": "gave_up"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,14 +159,13 @@ def parse_baseline(
     """Return the baseline in ``text``; raise ScenarioError that names source and key."""
     top = Table(parse(text, source), source)
     top.refuse_unknown({"schema", "cpu", "versions", "set"})
-    schema = top.integer("schema")
-    if schema not in (1, SCHEMA):
-        raise top.error("schema", f"found {shown(top.get('schema'))}, expected 1 or {SCHEMA}")
+    if top.integer("schema") != SCHEMA:
+        raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
     versions = top.table("versions")
     baseline = Baseline(
         cpu=top.string("cpu"),
         versions=tuple((name, versions.string(name)) for name in versions.values),
-        sets=tuple(_read_set(table, load_map, schema) for table in top.tables("set")),
+        sets=tuple(_read_set(table, load_map) for table in top.tables("set")),
     )
     _check(baseline, lambda problem: top.error("set", problem))
     return baseline
@@ -215,7 +211,7 @@ def _check(baseline: Baseline, error: Callable[[str], GarlError]) -> None:
             )
 
 
-def _read_set(table: Table, load_map: Callable[[str], Map], schema: int) -> BaselineSet:
+def _read_set(table: Table, load_map: Callable[[str], Map]) -> BaselineSet:
     table.refuse_unknown(_KEYS)
     for key in ("system", "simulator"):
         if not all(table.string(key).partition(":")):
@@ -235,25 +231,12 @@ def _read_set(table: Table, load_map: Callable[[str], Map], schema: int) -> Base
         simulator=table.string("simulator"),
         npcs=table.string("npcs"),
         npcs_sha256=table.string("npcs_sha256"),
-        method=table.string("method", ""),
+        method=table.string("method"),
         limits=read_limits(table.table("limits")),
-        flights=tuple(
-            _flight(reader, f"flights[{index}]", _upgraded(row, schema))
-            for index, row in enumerate(rows)
-        ),
+        flights=tuple(_flight(reader, f"flights[{index}]", row) for index, row in enumerate(rows)),
     )
 
 
 def _flight(reader: RowReader, key: str, row: Any) -> BaselineFlight:
     scenario, summary = reader.read(key, row)
     return BaselineFlight(scenario=scenario, summary=summary)
-
-
-def _upgraded(row: Any, schema: int) -> Any:
-    """Return a row as schema 2 has it; what is no row stays as it is."""
-    if schema == SCHEMA or not isinstance(row, list) or len(row) != 6:
-        return row
-    seed, outcome, signature, paper_violation, *rest = row
-    if isinstance(outcome, str):
-        outcome = _RENAMED.get(outcome, outcome)
-    return [seed, outcome, signature, paper_violation, "", [], *rest]

@@ -13,8 +13,10 @@ PairResult = Literal["same", "broke", "fixed", "changed"]
 """``broke`` and ``fixed``: the second flight ended worse or better; ``changed``: both violate, in
 different ways."""
 DIFFERENT_RESULTS: tuple[PairResult, ...] = ("broke", "fixed", "changed")
-Column = Literal["landed", "violations", "blocked", "excused", "needless", "unknown reason"]
+Column = Literal["landed", "violations", "blocked", "excused", "needless"]
 COLUMNS: tuple[Column, ...] = ("landed", "violations", "blocked", "excused", "needless")
+NOT_LANDED = ("gave_up", "not_landed")
+"""Outcomes of flights of which a reason says why they did not land."""
 DISTANCE_DIGITS, TIME_DIGITS = 4, 3
 """A tenth of a millimetre and a millisecond, far below what a landing repeats."""
 
@@ -25,8 +27,8 @@ class FlightSummary:
 
     ``signature`` is empty for a flight without violation.  ``paper_violation`` is the paper's
     definition, which the gate does not use.  ``no_landing`` says why a flight that was given up or
-    ran out of time is excused, or that it is not; files of schema 1 do not hold it.  ``distance_m``
-    and ``time_s`` are those of the landing, None without one.  ``sha256`` is the trajectory's hash.
+    ran out of time is excused, or that it is not.  ``distance_m`` and ``time_s`` are those of the
+    landing, None without one.  ``sha256`` is the trajectory's hash.
     """
 
     outcome: str
@@ -50,7 +52,7 @@ class FlightSummary:
     @property
     def not_landed(self) -> bool:
         """Whether the landing system gave up or ran out of time."""
-        return self.outcome in ("gave_up", "not_landed")
+        return self.outcome in NOT_LANDED
 
     @property
     def decided(self) -> bool:
@@ -87,8 +89,6 @@ class FlightSummary:
             return self.landed
         if column == "violations":
             return self.violated
-        if column == "unknown reason":
-            return self.is_safe_abort and not self.no_landing
         return self.no_landing == column
 
     @property
@@ -96,8 +96,7 @@ class FlightSummary:
         """The signature, or the outcome of a flight without violation."""
         if self.signature or not self.not_landed:
             return self.signature or self.outcome
-        outcome = self.outcome.replace("_", " ")
-        return f"{outcome} ({self.no_landing})" if self.no_landing else outcome
+        return f"{self.outcome.replace('_', ' ')} ({self.no_landing})"
 
 
 def violation_type_of(signature: str) -> str:
@@ -154,8 +153,6 @@ class Pair:
 
 
 def column_counts(flights: Sequence[FlightSummary]) -> dict[Column, int]:
-    """Return how many of the decided flights each column counts; empty rare columns are absent."""
+    """Return how many of the decided flights each column counts."""
     decided = [each for each in flights if each.decided]
-    counts = {name: sum(each.is_in(name) for each in decided) for name in COLUMNS}
-    unknown = sum(each.is_in("unknown reason") for each in decided)
-    return {**counts, "unknown reason": unknown} if unknown else counts
+    return {name: sum(each.is_in(name) for each in decided) for name in COLUMNS}

@@ -102,9 +102,3 @@ def _relative_change(limit: RelativeLimit, pairs: Sequence[Pair]) -> RelativeCha
         better=sum(limit.excess(after, before) > 0 for _, before, after in compared),
         p=signed_rank_p(excesses),
     )
-
-
-def lacks_sizes(pairs: Sequence[Pair]) -> bool:
-    """Return whether the base holds landings but no distance of any: an old file."""
-    landed = [pair.base for pair in pairs if pair.base.landed]
-    return bool(landed) and all(each.distance_m is None for each in landed)

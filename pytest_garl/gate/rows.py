@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Any, get_args
 
 from pytest_garl.files.toml import LARGEST_INTEGER, Table, finite, quoted
-from pytest_garl.gate.pairs import FlightSummary, NoLanding
+from pytest_garl.gate.pairs import NOT_LANDED, FlightSummary, NoLanding
 from pytest_garl.messages import listed, printable, shown
 from pytest_garl.scenarios.genes import object_gene
 from pytest_garl.scenarios.genome_like import genome_like
@@ -119,6 +119,18 @@ class RowReader:
             if word not in words:
                 known = ", ".join(each or "nothing" for each in words)
                 raise self.table.error(key, f"found {shown(word)}, expected one of {known}")
+        if bool(no_landing) is not (outcome in NOT_LANDED):
+            expected = "a reason" if outcome in NOT_LANDED else "none"
+            raise self.table.error(
+                key,
+                f"found {no_landing or 'no reason'!r} why the outcome {outcome} did not land, "
+                f"expected {expected}",
+            )
+        if bool(landing) is not (outcome == "landed"):
+            expected = "[distance, time]" if outcome == "landed" else "[]"
+            raise self.table.error(
+                key, f"found {shown(landing)} beside the outcome {outcome}, expected {expected}"
+            )
         distance_m, time_s = self._landing(key, landing)
         genes = self._listed(key, values)
         removed: tuple[str, ...] = ()

@@ -61,8 +61,7 @@ def camera_of(flight: FlightTask) -> Camera:
         raise GarlError(problem)
     if flight.camera is None:
         raise GarlError(
-            "the ledger does not name the camera, as those of earlier versions: search again, or "
-            "fly it with --garl-repeat"
+            "the ledger does not name the camera: search again, or fly it with --garl-repeat"
         )
     try:
         return dataclass_from(Camera, dict(flight.camera), "camera")

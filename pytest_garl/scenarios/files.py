@@ -20,8 +20,6 @@ from pytest_garl.scenarios.task import Task, read_task, task_lines
 from pytest_garl.scenarios.units import HEIGHT, from_sections, ranges_of, sections_of, snapped
 
 SCHEMA = 2
-FIRST_SCHEMA = 1
-"""Files of it state genes without unit, under ``genes``.  They are read."""
 
 
 def dumps(scenario: Scenario, map: Map) -> str:
@@ -48,7 +46,8 @@ def absent_line(scenario: Scenario, map: Map) -> list[str]:
 def is_in_units(scenario: Scenario, map: Map) -> bool:
     """Return whether a file in physical units has exactly the scenario's values.
 
-    A scenario of the first schema has genes of any number of digits; it keeps them.
+    A search method of a user's own may give genes of any number of digits.  Their file states them
+    without unit, under ``genes``, so that it flies to the byte as the search did.
     """
     return snapped(scenario, map) == scenario
 
@@ -88,9 +87,8 @@ def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
     """Return the scenario in ``text``; raise ScenarioError that names source and key."""
     top = Table(parse(text, source), source)
     top.refuse_unknown({"schema", "map", "seed", *SCENARIO_KEYS})
-    if top.integer("schema") not in (FIRST_SCHEMA, SCHEMA):
-        found = shown(top.get("schema"))
-        raise top.error("schema", f"found {found}, expected {FIRST_SCHEMA} or {SCHEMA}")
+    if top.integer("schema") != SCHEMA:
+        raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
     if top.string("map") != map.name:
         raise top.error("map", f"found {shown(top.string('map'))}, expected {map.name!r}")
     return read_scenario(top, map)

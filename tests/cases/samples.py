@@ -61,6 +61,8 @@ def case(
             neighbours_failed=3,
             removed="3 of 4 objects",
             versions=(("pytest-garl", "0.1.0"), ("numpy", "2.4.0")),
+            system_sha256="ef" * 32,
+            simulator_sha256="12" * 32,
         ),
         limits=Limits(),
     )

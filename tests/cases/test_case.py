@@ -16,7 +16,7 @@ def test_ids_of_cases_never_change() -> None:
     assert case_with_changes().id == "lawn-IV-dog-0eb186"
 
 
-FIRST_SCHEMA_GENES = (
+RAW_GENES = (
     ("environment.dust", 0.0767732437050385),
     ("environment.fog", 0.1425695544488903),
     ("environment.rain", 0.02162394190794506),
@@ -32,7 +32,7 @@ FIRST_SCHEMA_GENES = (
     ("dog-1.start_y", -0.43918248402792015),
     ("dog-1.velocity", 0.48519097443163506),
 )
-"""Of any digits, as searches saved them before files were in physical units."""
+"""Of any digits, as a search method of a user's own may give them."""
 
 
 def test_a_case_whose_genes_have_any_digits_keeps_its_id_through_its_file() -> None:
@@ -40,11 +40,11 @@ def test_a_case_whose_genes_have_any_digits_keeps_its_id_through_its_file() -> N
         (case(), "lawn-IV-dog-33ab15"),
         (case_with_changes(), "lawn-IV-dog-96cf0c"),
     ):
-        scenario = dataclasses.replace(each.scenario, genes=FIRST_SCHEMA_GENES)
-        old = dataclasses.replace(each, scenario=scenario)
-        assert old.id == name
-        assert "[genes.environment]\n" in dump_case(old)
-        assert parse_case(dump_case(old), load_map) == old
+        scenario = dataclasses.replace(each.scenario, genes=RAW_GENES)
+        raw = dataclasses.replace(each, scenario=scenario)
+        assert raw.id == name
+        assert "[genes.environment]\n" in dump_case(raw)
+        assert parse_case(dump_case(raw), load_map) == raw
 
 
 def test_id_names_map_type_and_subject_and_differs_between_scenarios() -> None:

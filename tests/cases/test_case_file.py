@@ -10,15 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pytest_garl.cases.case import (
-    NOT_ASKED,
-    Case,
     Escape,
     NoGateReason,
     Preventable,
     Prevention,
 )
 from pytest_garl.cases.case_file import dump_case, load_case, parse_case
-from pytest_garl.cases.case_header import SCHEMA
 from pytest_garl.errors import ScenarioError
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.messages import printable
@@ -28,7 +25,6 @@ from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.units import snapped
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.verdicts.verdict import Limits
 from tests.cases.samples import LAWN, OBJECT_NAMES, case, case_with_changes
 
 ROOT = Path(__file__).parents[2]
@@ -49,37 +45,9 @@ COMMITTED = [
 
 @pytest.mark.parametrize("path", COMMITTED, ids=lambda path: path.stem)
 def test_committed_case_is_read_and_keeps_its_name(path: Path) -> None:
-    committed, text = load_case(path), path.read_text(encoding="utf-8")
+    committed = load_case(path)
     assert committed.id == path.stem
-    assert parse_case(dump_case(committed), load_map) == committed
-    if f"schema = {SCHEMA}\n" in text:
-        assert dump_case(committed) == text
-
-
-def first_schema(status: str, avoidable: str, neighbours_failed: int = 3) -> Case:
-    """Read a case as version 0.1 wrote it."""
-    text = dump_case(dataclasses.replace(case(), live=False))
-    old = text.replace("schema = 2", "schema = 1").replace('abort = "needless"', 'abort = "ok"')
-    old = old.replace('status = "open"', f'status = "{status}"\navoidable = "{avoidable}"')
-    old = old.replace("neighbours_failed = 3", f"neighbours_failed = {neighbours_failed}")
-    return parse_case(old, load_map)
-
-
-def test_words_of_the_first_schema_are_read() -> None:
-    live, recorded = first_schema("open", "live"), first_schema("fixed", "recorded")
-    assert (live.status, live.live, live.gates) == ("open", True, True)
-    assert (recorded.status, recorded.live, recorded.gates) == ("fixed", False, True)
-    unavoidable = first_schema("unavoidable", "no")
-    assert (unavoidable.status, unavoidable.gates) == ("open", False)
-    assert (unavoidable.reason, unavoidable.live) == ("unpreventable", False)
-    assert first_schema("open", "live", neighbours_failed=2).reason == "edge"
-    assert {each.prevention for each in (live, recorded, unavoidable)} == {NOT_ASKED}
-
-
-def test_allowed_abort_of_the_first_schema_is_read_as_the_default_of_today() -> None:
-    assert first_schema("open", "live").limits.abort == "needless"
-    chosen = dataclasses.replace(case(), limits=Limits(abort="ok"))
-    assert parse_case(dump_case(chosen), load_map).limits.abort == "ok"
+    assert dump_case(committed) == path.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("answer", ["preventable", "sensor-limited", "unpreventable"])
@@ -148,12 +116,8 @@ def test_file_keeps_names_with_quotes_and_backslashes() -> None:
 
 def test_file_keeps_the_test_and_the_hashes_of_the_sources() -> None:
     plain = case()
-    evidence = dataclasses.replace(
-        plain.evidence, system_sha256="ef" * 32, simulator_sha256="12" * 32
-    )
-    with_node_id = dataclasses.replace(
-        plain, test="tests/test_it.py::TestIt::test_a", evidence=evidence
-    )
+    assert (plain.evidence.system_sha256, plain.evidence.simulator_sha256) == ("ef" * 32, "12" * 32)
+    with_node_id = dataclasses.replace(plain, test="tests/test_it.py::TestIt::test_a")
     assert parse_case(dump_case(with_node_id), load_map) == with_node_id
     assert with_node_id.id == plain.id
     assert with_node_id.asserting_test == ""
@@ -171,7 +135,9 @@ def test_file_keeps_the_test_and_the_hashes_of_the_sources() -> None:
         ('status = "open"', 'status = "open"\navoidable = "live"', "'avoidable': unknown key"),
         ('status = "open"', 'status = "open"\nreason = "edge"', "beside 'gates = false'"),
         ('status = "open"', 'status = "open"\ngates = false', "'reason'"),
-        ("schema = 2", "schema = 3", "expected 1 or 2"),
+        ("schema = 2", "schema = 1", "'schema': found 1, expected 2"),
+        (f'system_sha256 = "{"ef" * 32}"\n', "", "'evidence.system_sha256': missing"),
+        (f'simulator_sha256 = "{"12" * 32}"\n', "", "'evidence.simulator_sha256': missing"),
         ("[policy]", "[polices]", "'polices': unknown key"),
         ("neighbours = 3", "neighbours = -3", "'evidence.neighbours'"),
         ("time_s = 120.0", "time_s = -1.0", "'limits.time_s'"),
@@ -196,14 +162,16 @@ BODY = Severity(
     window_s=3.0,
 )
 CONDITIONS = Severity(
-    about="conditions", conditions=("fog", "wind"), largest="visibility 11 m", largest_share=0.9
+    about="conditions",
+    conditions=("fog", "wind"),
+    values=("visibility 11 m", "mean 3 m/s"),
+    largest="visibility 11 m",
+    largest_share=0.9,
 )
-
-NAMED = dataclasses.replace(CONDITIONS, values=("visibility 11 m", "mean 3 m/s"))
 
 
 def test_a_file_says_whether_its_severity_is_what_it_takes() -> None:
-    severe = dataclasses.replace(case(), severity=NAMED)
+    severe = dataclasses.replace(case(), severity=CONDITIONS)
     assert "# The conditions that it takes" in dump_case(severe)
     raw = dataclasses.replace(
         severe, evidence=dataclasses.replace(severe.evidence, neighbours=0, neighbours_failed=0)
@@ -217,8 +185,8 @@ def test_a_file_says_whether_its_severity_is_what_it_takes() -> None:
         BODY,
         dataclasses.replace(BODY, grade="", window_s=None, untried=("dog-1", "fog")),
         CONDITIONS,
-        NAMED,
-        dataclasses.replace(NAMED, untried=("wind",), unread=("fog",)),
+        Severity(about="conditions"),
+        dataclasses.replace(CONDITIONS, untried=("wind",), unread=("fog",)),
         NO_SEVERITY,
     ],
 )
@@ -245,3 +213,12 @@ def test_wrong_severity_is_an_error_that_names_its_key(old: str, new: str, words
     text = dump_case(dataclasses.replace(case(), severity=BODY))
     with pytest.raises(ScenarioError, match=words):
         parse_case(text.replace(old, new), load_map)
+
+
+def test_each_condition_of_a_severity_has_its_values() -> None:
+    text = dump_case(dataclasses.replace(case(), severity=CONDITIONS))
+    values = 'values = ["visibility 11 m", "mean 3 m/s"]\n'
+    assert values in text
+    words = "'severity.values': found 0 texts, expected one text for each of 2 conditions"
+    with pytest.raises(ScenarioError, match=words):
+        parse_case(text.replace(values, ""), load_map)

@@ -40,7 +40,7 @@ def test_description_of_a_collision_begins_with_the_adversary() -> None:
 
 def test_description_of_another_violation_begins_with_its_conditions() -> None:
     verdict = flight_result("II:lost", violation_type="II", story="Gave up.").verdict
-    fog = Severity(about="conditions", conditions=("fog",), largest="visibility 11 m")
+    fog = Severity(about="conditions", conditions=("fog",), values=("visibility 11 m",))
     told = describe(hits_a_person(), verdict, fog, is_shrunk=True)
     assert told == "Fog alone, visibility 11 m: Gave up."
 

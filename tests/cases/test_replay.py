@@ -83,11 +83,7 @@ def test_a_system_that_ends_the_process_is_not_fixed(tmp_path: Path) -> None:
     assert "lander:Lander: tried to end this process, with status 0" in done.stderr
 
 
-PLAIN = case()
-CASE = dataclasses.replace(
-    PLAIN,
-    evidence=dataclasses.replace(PLAIN.evidence, system_sha256="ef" * 32, simulator_sha256="12"),
-)
+CASE = case()
 SOURCES = SourceHashes.of(CASE.evidence)
 
 
@@ -112,13 +108,6 @@ def test_changes_of_map_and_simulator_are_both_named() -> None:
         "the map 'lawn' has changed",
         "the simulator has changed",
     )
-
-
-def test_case_without_a_hash_of_the_simulator_compares_versions() -> None:
-    evidence = dataclasses.replace(PLAIN.evidence, versions=(("pytest-garl", "0.0.1"),))
-    old = dataclasses.replace(PLAIN, evidence=evidence)
-    (reason,) = stale_reasons(old, SourceHashes.of(evidence), "another flight")
-    assert reason.startswith("pytest-garl was 0.0.1 and is ")
 
 
 def replayed(outcome: str, excuse: str = "", signature: str = "") -> Replay:

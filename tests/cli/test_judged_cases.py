@@ -14,6 +14,7 @@ from click.testing import CliRunner, Result
 from pytest_garl.cases.case_file import load_case
 from pytest_garl.cases.corpus import replace_file
 from pytest_garl.cli import main
+from pytest_garl.execution.reference import Reference, simulator_sha256
 from tests.support.case_project import USER_PROPERTY_TEST, let_system_avoid_dog, replace_text
 from tests.support.landing_project import write_project
 
@@ -184,12 +185,11 @@ CONTACT = (
 
 
 def simulator_is_as_it_was(file: Path) -> None:
-    """Let a case have been saved before its simulator was hashed."""
+    """Let a case have been saved with the simulator of today."""
+    simulator = Reference(module="tiny_simulator", file="tiny_simulator.py", qualname="fly")
     case = load_case(file)
-    replace_file(
-        file,
-        dataclasses.replace(case, evidence=dataclasses.replace(case.evidence, simulator_sha256="")),
-    )
+    evidence = dataclasses.replace(case.evidence, simulator_sha256=simulator_sha256(simulator))
+    replace_file(file, dataclasses.replace(case, evidence=evidence))
 
 
 def test_built_in_verdict_judges_a_case_without_its_test(project: Path) -> None:

@@ -36,7 +36,7 @@ BASELINE = baselines.dump_baseline(baseline())
         (
             "flights = ",
             "\n]",
-            '[[0, "landed", "", false, "", [], "", [1]]',
+            '[[0, "crashed", "", false, "", [], "", [1]]',
             "found 1 values of genes",
         ),
     ],

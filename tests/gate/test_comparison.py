@@ -240,7 +240,7 @@ def test_the_report_has_the_answer_then_figures_then_a_limited_list_of_pairs() -
     )
     assert lines[6:8] == [
         "safe aborts 1 -> 0 (0 landings lost, 1 landings won): too few pairs differ to fail",
-        "distance and time not compared: the baseline holds no distances; save it anew",
+        "distance and time not compared: in no pair did both flights land",
     ]
     assert "broke    lawn-0: landed -> IV:dog:descent:seen" in lines
     assert "broke    and 5 more" in lines

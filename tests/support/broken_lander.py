@@ -11,6 +11,7 @@ import pytest
 
 from pytest_garl.cases.case import Case, Evidence, Violation
 from pytest_garl.cases.corpus import Corpus
+from pytest_garl.execution.reference import BUILT_IN, simulator_sha256
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
@@ -71,6 +72,8 @@ def case_of_broken_lander() -> Case:
             neighbours_failed=3,
             removed="nothing",
             versions=(("pytest-garl", version("pytest-garl")),),
+            system_sha256="",
+            simulator_sha256=simulator_sha256(BUILT_IN),
         ),
         # The repaired lander gives up at once.
         limits=Limits(abort="ok"),

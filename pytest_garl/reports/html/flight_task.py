@@ -231,7 +231,7 @@ def _drawn(
         renderer = renderer_of(scenario, place_flown, camera)
         scene = scene_data(place_flown, renderer)
         if task.camera is None:
-            note = "The ledger does not name the camera, as those of earlier versions: no pictures."
+            note = "The ledger does not name the camera: no pictures."
             return _Drawn(scene=scene, notes=(note,))
         stills, thumbnail = stills_of(evidence, scenario, renderer, moments)
     except (GarlError, ValueError) as error:
