@@ -24,7 +24,7 @@ from pytest_garl.scenarios.groups import WEATHER
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import MARKER_DICTIONARY, TARGET_MARKER_ID
+from pytest_garl.scenarios.placed import MARKER_DICTIONARY, TARGET_MARKER_ID, Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.cover_event import renderer_of
@@ -219,7 +219,7 @@ def drawn_frames(number: int, kind: Kind) -> Iterator[tuple[DrawnFrame, Scenario
     rng = np.random.default_rng([SEED, KINDS.index(kind), number])
     map = load_map(MAPS[number % len(MAPS)])
     scenario = random_scenario(rng, map)
-    renderer = renderer_of(scenario, map, CAMERA)
+    renderer = renderer_of(Placed(scenario, map), CAMERA)
     for _ in range(FRAMES):
         position, attitude = random_pose(rng, renderer.marker_m, kind)
         objects = random_objects(rng, map, renderer.marker_m)

@@ -21,10 +21,7 @@ from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.severity import NO_SEVERITY
 from pytest_garl.scenarios.groups import DECOY_KINDS
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import (
-    marker_position_m,
-    told_position_m,
-)
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import Margin, MarginName, Verdict
 
@@ -50,7 +47,8 @@ LOSSES = (
 
 def stand_in(scenario: Scenario, map: Map, landing: LandingModel = ORDINARY) -> FlightResult:
     """Return the result of a landing in a scenario of `field`."""
-    told, marker = told_position_m(scenario, map), marker_position_m(scenario, map)
+    placed = Placed(scenario, map)
+    told, marker = placed.told_m, placed.marker_m
     told = _moved(told, scenario["told.error_m"], scenario["told.towards_deg"])
     away = math.dist(map.uav_start_m[:2], told)
     over_told_s = TAKE_OFF_S + away / CRUISE_MPS

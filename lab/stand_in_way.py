@@ -6,14 +6,9 @@ import math
 from dataclasses import dataclass
 
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import (
-    object_altitude_m,
-    object_speed_mps,
-    object_start_m,
-    object_type,
-)
+from pytest_garl.scenarios.placed import Placed, PlacedNpc
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.story import LIMITS_S, Story, story_of
+from pytest_garl.scenarios.story import LIMITS_S, Story
 from pytest_garl.verdicts.verdict import PropertyName, ViolationType
 
 HIGH_M = 10.0
@@ -110,13 +105,14 @@ def meet_bodies(
     ``gives_way_m`` is how far the landing moves away from bodies that it sees, and from others.
     """
     gaps = []
-    for name, _ in map.without(scenario.removed_objects).present_objects:
-        story = story_of(scenario, name)
-        if story is None or object_speed_mps(scenario, map, name) <= 0:
+    placed = Placed(scenario, map)
+    for name, _ in placed.map.present_objects:
+        story = placed.npc(name).story
+        if story is None or placed.npc(name).speed_mps <= 0:
             continue
-        gap, at_s, seen = _least_gap(scenario, map, way, name, story)
+        gap, at_s, seen = _least_gap(placed.npc(name), way, story)
         gap += gives_way_m[0] if seen else gives_way_m[1]
-        kind = object_type(scenario, map, name).name
+        kind = placed.npc(name).type.name
         signature = f"IV:{kind}:{way.phase(at_s)}:{'seen' if seen else 'unseen'}"
         gaps.append((max(0.0, gap), signature, name))
         if gap <= 0:
@@ -124,15 +120,12 @@ def meet_bodies(
     return gaps
 
 
-def _least_gap(
-    scenario: Scenario, map: Map, way: Way, name: str, story: Story
-) -> tuple[float, float, bool]:
+def _least_gap(npc: PlacedNpc, way: Way, story: Story) -> tuple[float, float, bool]:
     """Return the least gap between the UAV and a body, when it was, and whether it was in view."""
-    kind, speed = object_type(scenario, map, name), object_speed_mps(scenario, map, name)
-    x, y = object_start_m(scenario, map, name)
+    kind, speed, (x, y) = npc.type, npc.speed_mps, npc.start_m
     cx, cy = (a + b for a, b in zip(way.marker_m, story.crossing_m, strict=True))
     begins = story.begins_s(way.phases_s)
-    middle = object_altitude_m(scenario, map, name)
+    middle = npc.height_m
     stays_until, met_s, crossed = math.inf, math.inf, False
     best = (10.0, 0.0, False)
     for step in range(round((way.lands_s + 3) / STEP_S)):

@@ -25,6 +25,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera import renderer as renderer_module
@@ -65,7 +66,7 @@ def scenarios(domain: str, map_name: str, count: int) -> Iterator[Scenario]:
 def frame_ms(scenario: Scenario) -> list[float]:
     """Return the processor time in milliseconds of each frame of a landing's views."""
     map, rng = load_map(scenario.map), np.random.default_rng(scenario.seed)
-    made = renderer_of(scenario, map, Camera())
+    made = renderer_of(Placed(scenario, map), Camera())
     x, y = made.marker_m
     times = []
     for number, height in enumerate(HEIGHTS_M):

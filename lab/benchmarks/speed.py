@@ -29,6 +29,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.fly import fly
@@ -59,7 +60,7 @@ def frames() -> None:
         case = scenario.replace({**dict.fromkeys(weather, value), "environment.sun_position": 0.4})
         for width, height in ((320, 240), (640, 480)):
             camera = Camera(width_px=width, height_px=height)
-            renderer = Renderer(case, map, camera, generator(0, "sensor"))
+            renderer = Renderer(Placed(case, map), camera, generator(0, "sensor"))
             x, y = renderer.marker_m
             objects = [((x + 1.0 + i, y + 1.0, 0.0), 0.3) for i in range(len(map.present_objects))]
             for height_m in (10.0, 2.0):

@@ -20,6 +20,7 @@ from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.projection import View
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.randomness import generator
@@ -82,7 +83,7 @@ def main() -> None:
         flight = load(path)
         scenario = parse_scenario(next(iter(scenarios.values())))
         map = load_map(name)
-        renderer = Renderer(scenario, map, Camera(), generator(scenario.seed, "sensor"))
+        renderer = Renderer(Placed(scenario, map), Camera(), generator(scenario.seed, "sensor"))
         target = arguments.garl_dir / f"{path.stem}.png"
         picture = sheet(flight, renderer, arguments.spacing)
         cv2.imwrite(str(target), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))

@@ -11,6 +11,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.renderer import Renderer
 
@@ -31,7 +32,7 @@ def sheet(name: str) -> np.ndarray:
     changes += [{"environment.sun_position": value} for value in (0.0, 0.05, 0.12)]
     cells = []
     for change in changes:
-        renderer = Renderer(clear.replace(change), map, Camera(), np.random.default_rng(0))
+        renderer = Renderer(Placed(clear.replace(change), map), Camera(), np.random.default_rng(0))
         x, y = renderer.marker_m
         objects = [((x + 1.3, y + 0.9, 0.0), 0.5), ((x - 3.0, y + 1.0, 0.0), 2.5)]
         objects += [((x + 0.9, y - 1.2, 3.0), 1.0), ((x - 1.5, y - 0.6, 0.0), 0.2)]

@@ -23,6 +23,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.groups import WEATHER
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.camera.renderer import Renderer
@@ -61,7 +62,7 @@ def main() -> None:
             print(f"{type_name}: none of {TRIES} flights hit it")
             continue
         scenario, flight = found
-        renderer = Renderer(scenario, map, Camera(), generator(scenario.seed, "sensor"))
+        renderer = Renderer(Placed(scenario, map), Camera(), generator(scenario.seed, "sensor"))
         target = arguments.out / f"npc-{type_name}.png"
         target.parent.mkdir(parents=True, exist_ok=True)
         picture = sheet(flight, renderer, 0.6)

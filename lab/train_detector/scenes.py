@@ -17,7 +17,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import CONFINED_WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import TARGET_MARKER_ID
+from pytest_garl.scenarios.placed import TARGET_MARKER_ID, Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import repair
@@ -106,7 +106,7 @@ def pictures(
     """Yield ``count`` pictures of one random scenario from random poses."""
     scenario = random_scenario(rng, map, weather)
     task = Task(marker=MarkerSpec(id=marker_id))
-    renderer = Renderer(dataclasses.replace(scenario, task=task), map, CAMERA, rng)
+    renderer = Renderer(Placed(dataclasses.replace(scenario, task=task), map), CAMERA, rng)
     prints = [Print(marker_id=marker_id, place_m=renderer.marker_m)]
     prints += [
         Print(

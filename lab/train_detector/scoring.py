@@ -12,7 +12,7 @@ import numpy as np
 from lab.train_detector.scenes import CAMERA, Marker, Picture
 from pytest_garl import Detection, Mission, Observation
 from pytest_garl.fiducial import MARKER_SIDE_M
-from pytest_garl.scenarios.placement import MARKER_DICTIONARY
+from pytest_garl.scenarios.placed import MARKER_DICTIONARY
 
 Kind = Literal["right", "wrong-id", "nothing-there"]
 

@@ -13,13 +13,7 @@ from pytest_garl.flight.flight import Flight, ObjectRecord
 from pytest_garl.flight.thresholds import up_m
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import (
-    map_in,
-    marker_position_m,
-    object_destination_m,
-    object_speed_mps,
-    object_start_m,
-)
+from pytest_garl.scenarios.placed import Placed, PlacedNpc
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.units import conditions_in_words
 from pytest_garl.verdicts.verdict import Verdict
@@ -115,21 +109,20 @@ def describe_scenario_on(
 ) -> list[tuple[str, str]]:
     """Return what :func:`describe_scenario` does, for a map that is read already."""
     rows = conditions_in_words(scenario, map)
-    x, y = marker_position_m(scenario, map)
+    placed = Placed(scenario, map)
+    x, y = placed.marker_m
     rows.append(("marker", f"at ({x:.1f}, {y:.1f}) m, east and north"))
-    for name, kind in map_in(scenario, map).present_objects:
-        story = story_in_words(scenario, map, name, policy)
-        rows.append((name, story or _object_in_words(scenario, map, name, kind)))
+    for name, _ in placed.map.present_objects:
+        story = story_in_words(placed, name, policy)
+        rows.append((name, story or _npc_in_words(placed.npc(name))))
     return rows
 
 
-def _object_in_words(scenario: Scenario, map: Map, name: str, kind: str) -> str:
-    x, y = object_start_m(scenario, map, name)
-    speed = object_speed_mps(scenario, map, name)
+def _npc_in_words(npc: PlacedNpc) -> str:
+    (x, y), goal = npc.start_m, npc.destination_m
     way = f"from ({x:.1f}, {y:.1f}) m"
-    goal = object_destination_m(scenario, map, name)
     way += f" to ({goal[0]:.1f}, {goal[1]:.1f}) m and back" if goal else ""
-    return f"a {kind} of up to {speed:.2f} m/s, {way}"
+    return f"a {npc.type.name} of up to {npc.speed_mps:.2f} m/s, {way}"
 
 
 def scenario_in_words(

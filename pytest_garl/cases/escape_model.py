@@ -19,6 +19,7 @@ from pytest_garl.flight.thresholds import GRAVITY_MPS2, up_m
 from pytest_garl.landing_system import Airframe, VelocitySetpoint
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.npc_policy import (
@@ -148,10 +149,8 @@ class EscapeModel:
         """Return the NPCs as they are at the takeover, their policies after the whole flight."""
         chase = self._chase
         numbers = {name: index for index, (name, _) in enumerate(chase.map.all_objects)}
-        npcs = [
-            Npc(chase.scenario, chase.map, item.name, chase.npcs.make())
-            for item in chase.flight.objects
-        ]
+        placed = Placed(chase.scenario, chase.map)
+        npcs = [Npc(placed, item.name, chase.npcs.make()) for item in chase.flight.objects]
         step = round(DECISION_STEP_S * PHYSICS_RATE_HZ)
         decisions = math.ceil(self.from_s / DECISION_STEP_S - 1e-9)
         for number in range(max(1, decisions)):

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from pytest_garl.cases.case import MoveList, Moves, RecordedBehaviour
 from pytest_garl.flight.flight import Flight
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import start_genes
+from pytest_garl.scenarios.placed import start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S

@@ -37,7 +37,7 @@ from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Airframe, airframe_of
 from pytest_garl.npcs.recorded import handed_over_spec
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import map_in
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.land_detector import DETECTED_AFTER_S
 from pytest_garl.simulation.navigation import error_m_at
@@ -173,7 +173,7 @@ def collision_of(
     contact = flight.contacts[-1] if flight.contacts else None
     recorded = {item.name: item.type for item in flight.objects}
     # A user's own simulator may record no objects, or others.
-    present = map_in(scenario, map)
+    present = Placed(scenario, map).map
     if contact is None or contact.body not in recorded or recorded != dict(present.present_objects):
         return None
     try:

@@ -5,16 +5,8 @@ from __future__ import annotations
 import math
 
 from pytest_garl.npcs.grades import GRADE_LIMITS
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import (
-    marker_position_m,
-    object_altitude_m,
-    object_speed_mps,
-    object_start_m,
-    object_type,
-)
-from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.story import GRADES, LIMITS_S, PHASES, Story, story_of
+from pytest_garl.scenarios.placed import Place, Placed, PlacedNpc
+from pytest_garl.scenarios.story import GRADES, LIMITS_S, PHASES, Story
 from pytest_garl.simulation.physics.bird_path import LEAST_HEIGHT_M
 from pytest_garl.verdicts.wording import compass_point
 
@@ -44,19 +36,19 @@ def grade_in_words(grade: str) -> str:
     )
 
 
-def story_in_words(scenario: Scenario, map: Map, name: str, policy: str = "graded") -> str:
+def story_in_words(placed: Placed, name: str, policy: str = "graded") -> str:
     """Return what an NPC does, ``a careless person: sets off from ...``.
 
     ``policy`` names the NPC policy that moves it.  Returns nothing for an NPC without a story, and
     for one whose policy follows none.
     """
-    story = story_of(scenario, name)
+    npc = placed.npc(name)
+    story = npc.story
     if story is None or (policy != "graded" and policy not in GRADES):
         return ""
     grade = story.grade if policy == "graded" else policy
-    kind = object_type(scenario, map, name)
-    speed_mps = object_speed_mps(scenario, map, name)
-    told = [f"a {grade} {kind.name}: {_comes(scenario, map, name, story, grade)}"]
+    kind, speed_mps = npc.type, npc.speed_mps
+    told = [f"a {grade} {kind.name}: {_comes(placed.marker_m, npc, story, grade)}"]
     if grade == "careless":
         told.append(f"crosses {_place(story.crossing_m)} at {speed_mps:.1f} m/s")
         if story.pause_s > 0 and not kind.flies:
@@ -66,7 +58,7 @@ def story_in_words(scenario: Scenario, map: Map, name: str, policy: str = "grade
         told.append(f"{verb} at up to {speed_mps:.1f} m/s")
         told.append(_interferes(min(story.lasts_s, LIMITS_S[grade]), grade))
     if kind.flies:
-        height_m = object_altitude_m(scenario, map, name)
+        height_m = npc.height_m
         told[1] += f", {height_m:.1f} m up"
         lowest_m = max(min(height_m, LEAST_HEIGHT_M), height_m - story.stoop_m)
         if story.stoop_m > 0 and grade != "hostile":
@@ -74,18 +66,18 @@ def story_in_words(scenario: Scenario, map: Map, name: str, policy: str = "grade
     return ", ".join(told)
 
 
-def _comes(scenario: Scenario, map: Map, name: str, story: Story, grade: str) -> str:
+def _comes(marker_m: Place, npc: PlacedNpc, story: Story, grade: str) -> str:
     """Return from where and when it comes; a bird comes from afar."""
-    x, y = object_start_m(scenario, map, name)
+    x, y = npc.start_m
     origin = f"({x:.1f}, {y:.1f}) m"
     if grade == "hostile":
         return f"is there from the start, at {origin}"
     when = f"when {_PHASES[PHASES[story.phase]]}"
     if story.delay_s > 0:
         when = f"{story.delay_s:.1f} s after {_PHASES[PHASES[story.phase]]}"
-    if not object_type(scenario, map, name).flies:
+    if not npc.type.flies:
         return f"sets off from {origin} {when}"
-    mx, my = marker_position_m(scenario, map)
+    mx, my = marker_m
     dx, dy = story.crossing_m
     return f"comes from the {compass_point(x - mx - dx, y - my - dy)} {when}"
 

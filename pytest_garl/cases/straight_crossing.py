@@ -18,7 +18,7 @@ from pytest_garl.flight.flight import Flight, ObjectRecord
 from pytest_garl.scenarios.bodies import Disc, discs_of
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES, ObjectType
-from pytest_garl.scenarios.placement import marker_position_m, object_altitude_m, start_genes
+from pytest_garl.scenarios.placed import Placed, start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, STORY, with_all_values
 from pytest_garl.scenarios.units import HEIGHT, PLACE_DIGITS
@@ -185,7 +185,8 @@ def _with_story(
 ) -> Scenario:
     name, kind = encounter.name, encounter.type
     x, y, z = encounter.place_m
-    mx, my = marker_position_m(bare, map)
+    placed = Placed(bare, map)
+    mx, my = placed.marker_m
     story = {
         "grade": float(GRADES.index("careless")),
         "body": float(kind.name == "child"),
@@ -197,7 +198,7 @@ def _with_story(
     if kind.flies:
         # Its own height may be lower than a stoop ends.
         height_m = round(min(HEIGHTS_M[1], max(HEIGHTS_M[0], LEAST_HEIGHT_M, z)), PLACE_DIGITS)
-        if height_m != object_altitude_m(bare, map, name) or bare.get(f"{name}.{HEIGHT}", 0.0):
+        if height_m != placed.npc(name).height_m or bare.get(f"{name}.{HEIGHT}", 0.0):
             values[f"{name}.{HEIGHT}"] = height_m
     values |= start_genes(name, start, map)
     values |= with_all_values(story, name, encounter.kind)

@@ -27,7 +27,7 @@ from pytest_garl.reports.mcap.source import Export, Place
 from pytest_garl.scenarios.files import load as load_scenario
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.placement import map_in
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
@@ -155,7 +155,7 @@ class FlightName:
             )
             place = Place(
                 scenario=scenario,
-                map=map_in(scenario, load_map(scenario.map, _MAPS)),
+                map=Placed(scenario, load_map(scenario.map, _MAPS)).map,
                 camera=airframe_of(imported_system(self.system)).camera,
             )
         elif self.scenario is not None or self.system is not None:
@@ -241,7 +241,7 @@ def flown_again(
         limits=case.limits,
         place=Place(
             scenario=case.scenario,
-            map=map_in(case.scenario, replayed.map),
+            map=Placed(case.scenario, replayed.map).map,
             camera=airframe_of(system_of(case, root)).camera,
         ),
         how=f"flown again{other}",
@@ -271,7 +271,7 @@ def _recorded(task: FlightTask, flight: Flight) -> NamedFlight:
     except GarlError as error:
         unseen = str(error)
     scenario = parse_scenario(task.scenario)
-    place = Place(scenario=scenario, map=map_in(scenario, map), camera=camera)
+    place = Place(scenario=scenario, map=Placed(scenario, map).map, camera=camera)
     return replace(found, place=place, no_pictures=unseen, notes=notes)
 
 

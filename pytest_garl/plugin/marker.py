@@ -14,7 +14,7 @@ from pytest_garl.execution.sources import data_files
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
-from pytest_garl.scenarios.placement import MAP_DICTIONARY
+from pytest_garl.scenarios.placed import MAP_DICTIONARY
 from pytest_garl.scenarios.task import Start, StartMode, Task
 
 if TYPE_CHECKING:

@@ -48,6 +48,11 @@ class Start:
                 f"{START_OFFSET_M:g} m of the told coordinate"
             )
 
+    @property
+    def hovers(self) -> bool:
+        """Whether the flight begins in the air."""
+        return self.mode == "hover"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:

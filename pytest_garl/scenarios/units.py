@@ -23,15 +23,7 @@ from pytest_garl.scenarios.light import (
 )
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES
-from pytest_garl.scenarios.placement import (
-    MARKER_RADIUS_M,
-    marker_genes,
-    marker_position_m,
-    object_destination_m,
-    object_speed_mps,
-    object_start_m,
-    place_genes,
-)
+from pytest_garl.scenarios.placed import MARKER_RADIUS_M, Placed, marker_genes, place_genes
 from pytest_garl.scenarios.quantities import Quantity, significant
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import STORY, story_values, with_all_values
@@ -74,14 +66,15 @@ def sections_of(scenario: Scenario, map: Map) -> dict[str, dict[str, float]]:
         azimuth = round((sun_azimuth_deg(position) + turn) % 360.0, ANGLE_DIGITS)
         elevation = round(sun_elevation_deg(position), ANGLE_DIGITS)
         sections["light"] = dict(zip(LIGHT, (elevation, azimuth), strict=True))
-    sections["marker"] = _inside_disc(_named("", marker_position_m(scenario, map)), map)
+    placed = Placed(scenario, map)
+    sections["marker"] = _inside_disc(_named("", placed.marker_m), map)
     kinds = dict(map.all_objects)
-    for name, _ in map.without(scenario.removed_objects).present_objects:
-        values = _named("start_", object_start_m(scenario, map, name))
-        goal = object_destination_m(scenario, map, name)
-        if goal:
-            values |= _named("destination_", goal)
-        values["speed_mps"] = round(object_speed_mps(scenario, map, name), PLACE_DIGITS)
+    for name, _ in placed.map.present_objects:
+        npc = placed.npc(name)
+        values = _named("start_", npc.start_m)
+        if npc.destination_m:
+            values |= _named("destination_", npc.destination_m)
+        values["speed_mps"] = round(npc.speed_mps, PLACE_DIGITS)
         if any(key == f"{name}.{HEIGHT}" for key, _ in scenario.genes):
             values[HEIGHT] = round(scenario[f"{name}.{HEIGHT}"], PLACE_DIGITS)
         told = story_values(scenario, name, kinds[name])

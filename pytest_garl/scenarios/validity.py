@@ -11,18 +11,15 @@ from pytest_garl.scenarios.bodies import Disc, discs_of
 from pytest_garl.scenarios.groups import CLEARANCE, DECOY_REACH_M, GROUPS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import (
+from pytest_garl.scenarios.placed import (
     MARKER_RADIUS_M,
-    decoys_of,
-    map_in,
+    UAV_CLEARANCE_M,
+    Place,
+    Placed,
     marker_genes,
-    marker_position_m,
-    object_altitude_m,
-    object_start_m,
     start_genes,
 )
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.start import UAV_CLEARANCE_M, start_m
 from pytest_garl.scenarios.units import PLACE_DIGITS, snapped
 
 UAV_REACH_M = 0.75
@@ -39,15 +36,11 @@ _DIRECTIONS = 32
 
 def problems(scenario: Scenario, map: Map) -> tuple[str, ...]:
     """Return what is wrong with the scenario, one sentence each; nothing if it is valid."""
-    map = map_in(scenario, map)
-    discs = tuple(disc for body in map.bodies for disc in discs_of(body))
-    marker = marker_position_m(scenario, map)
-    found = list(_marker_problems(marker, scenario, map, discs))
-    found += _decoy_problems(scenario, map)
-    for index, (name, _) in enumerate(map.present_objects):
-        found += _start_problems(
-            scenario, map, discs, marker, index, object_start_m(scenario, map, name)
-        )
+    placed = Placed(scenario, map)
+    discs = _discs_on(map)
+    found = [*_marker_problems(placed, discs, placed.marker_m), *_decoy_problems(placed)]
+    for index, (name, _) in enumerate(placed.map.present_objects):
+        found += _start_problems(placed, discs, index, placed.npc(name).start_m)
     return tuple(found)
 
 
@@ -59,46 +52,43 @@ def repair(scenario: Scenario, map: Map) -> Scenario:
     settled already.
     """
     scenario = snapped(scenario, map)
-    map = map_in(scenario, map)
-    discs = tuple(disc for body in map.bodies for disc in discs_of(body))
-    marker = marker_position_m(scenario, map)
-    wanted = scenario
-    if any(_marker_problems(marker, scenario, map, discs)):
+    discs = _discs_on(map)
+    wanted = Placed(scenario, map)
+    if any(_marker_problems(wanted, discs, wanted.marker_m)):
         place = _nearest(
-            marker,
-            lambda at: not any(_marker_problems(at, wanted, map, discs)),
-            lambda at: marker_position_m(wanted.replace(marker_genes(at, map)), map),
+            wanted.marker_m,
+            lambda at: not any(_marker_problems(wanted, discs, at)),
+            lambda at: Placed(wanted.scenario.replace(marker_genes(at, map)), map).marker_m,
         )
         scenario = scenario.replace(marker_genes(place, map))
-    scenario = _with_free_decoys(scenario, map)
-    for index, (name, _) in enumerate(map.present_objects):
-        marker = marker_position_m(scenario, map)
-        start = object_start_m(scenario, map, name)
+    placed = Placed(_with_free_decoys(scenario, map), map)
+    for index, (name, _) in enumerate(placed.map.present_objects):
 
-        def free(
-            at: tuple[float, float],
-            scenario: Scenario = scenario,
-            marker: tuple[float, float] = marker,
-            index: int = index,
-        ) -> bool:
-            return not any(_start_problems(scenario, map, discs, marker, index, at))
+        def free(at: Place, placed: Placed = placed, index: int = index) -> bool:
+            return not any(_start_problems(placed, discs, index, at))
 
-        def kept(
-            at: tuple[float, float], scenario: Scenario = scenario, name: str = name
-        ) -> tuple[float, float]:
-            return object_start_m(scenario.replace(start_genes(name, at, map)), map, name)
+        def moved(at: Place, placed: Placed = placed, name: str = name) -> Placed:
+            return Placed(placed.scenario.replace(start_genes(name, at, map)), map)
 
+        def kept(at: Place, moved: Callable[[Place], Placed] = moved, name: str = name) -> Place:
+            return moved(at).npc(name).start_m
+
+        start = placed.npc(name).start_m
         if not free(start):
-            scenario = scenario.replace(start_genes(name, _nearest(start, free, kept), map))
-    return scenario
+            placed = moved(_nearest(start, free, kept))
+    return placed.scenario
+
+
+def _discs_on(map: Map) -> tuple[Disc, ...]:
+    return tuple(disc for body in map.bodies for disc in discs_of(body))
 
 
 def _nearest(
-    origin: tuple[float, float],
-    valid: Callable[[tuple[float, float]], bool],
-    kept: Callable[[tuple[float, float]], tuple[float, float]] = lambda at: at,
+    origin: Place,
+    valid: Callable[[Place], bool],
+    kept: Callable[[Place], Place] = lambda at: at,
     within_m: float = 200.0,
-) -> tuple[float, float]:
+) -> Place:
     """Search rings of growing radius for a place that is valid as a scenario keeps it.
 
     ``kept`` returns a place as genes give it back, which may be nearer by a rounding error.
@@ -126,9 +116,9 @@ def clearance_m(marker: MarkerSpec, wanted_m: float = CLEARANCE.nominal) -> floa
     return min(usual, wanted_m) if wanted_m < CLEARANCE.nominal else usual
 
 
-def _marker_problems(
-    marker: tuple[float, float], scenario: Scenario, map: Map, discs: Iterable[Disc]
-) -> Iterable[str]:
+def _marker_problems(placed: Placed, discs: Iterable[Disc], marker: Place) -> Iterable[str]:
+    """Yield what is wrong with a place of the marker."""
+    scenario, map = placed.scenario, placed.map
     (x, y), spec = marker, scenario.task.marker
     clearance = clearance_m(spec, scenario["pad.clearance_m"])
     if math.dist(marker, map.gps_position_m) > MARKER_RADIUS_M + 1e-9:
@@ -146,15 +136,15 @@ def _marker_problems(
         yield "the marker lies under the UAV's start"
 
 
-def _decoy_problems(scenario: Scenario, map: Map, among: str = "") -> Iterable[str]:
+def _decoy_problems(placed: Placed, among: str = "") -> Iterable[str]:
     """Yield what is wrong with the decoys, or with the one of a name; a later one gives way."""
-    taken = [("the marker", marker_position_m(scenario, map), scenario.task.marker.reach_m)]
+    taken = [("the marker", placed.marker_m, placed.scenario.task.marker.reach_m)]
     taken += [
         (each.name, each.points_m[0], each.size_m * MARGINED / math.sqrt(2))
-        for each in map.ground.layers
+        for each in placed.map.ground.layers
         if each.kind == "marker"
     ]
-    for decoy in decoys_of(scenario, map):
+    for decoy in placed.decoys:
         reach = decoy.side_m * MARGINED / math.sqrt(2)
         if among in ("", decoy.name):
             for name, place, other_reach in taken:
@@ -165,17 +155,15 @@ def _decoy_problems(scenario: Scenario, map: Map, among: str = "") -> Iterable[s
 
 def _with_free_decoys(scenario: Scenario, map: Map) -> Scenario:
     """Return the scenario with each decoy moved to where it is free, or without it if none is."""
-    for decoy in decoys_of(scenario, map):
+    for decoy in Placed(scenario, map).decoys:
         x, y = f"{decoy.name}.x_m", f"{decoy.name}.y_m"
 
-        def moved(
-            at: tuple[float, float], scenario: Scenario = scenario, x: str = x, y: str = y
-        ) -> Scenario:
+        def moved(at: Place, scenario: Scenario = scenario, x: str = x, y: str = y) -> Scenario:
             return scenario.replace({x: at[0], y: at[1]})
 
-        def free(at: tuple[float, float], name: str = decoy.name) -> bool:
+        def free(at: Place, name: str = decoy.name) -> bool:
             near = max(abs(at[0]), abs(at[1])) <= DECOY_REACH_M
-            return near and not any(_decoy_problems(moved(at), map, name))
+            return near and not any(_decoy_problems(Placed(moved(at), map), name))
 
         place = scenario[x], scenario[y]
         if not free(place):
@@ -187,18 +175,13 @@ def _with_free_decoys(scenario: Scenario, map: Map) -> Scenario:
     return scenario
 
 
-def _start_problems(
-    scenario: Scenario,
-    map: Map,
-    discs: Iterable[Disc],
-    marker: tuple[float, float],
-    index: int,
-    at: tuple[float, float],
-) -> Iterable[str]:
+def _start_problems(placed: Placed, discs: Iterable[Disc], index: int, at: Place) -> Iterable[str]:
+    """Yield what is wrong with a start of an NPC."""
+    map, marker = placed.map, placed.scenario.task.marker
     name, kind_name = map.present_objects[index]
     kind = OBJECT_TYPES[kind_name]
     reach = kind.radius_m + OBJECT_CLEARANCE_M
-    bottom_m = object_altitude_m(scenario, map, name) + kind.low_m
+    bottom_m = placed.npc(name).height_m + kind.low_m
     x_min, x_max, y_min, y_max = map.bounds_m
     tolerance = 1e-9
     if not (
@@ -212,12 +195,12 @@ def _start_problems(
             yield f"{name} starts in or at {disc.name}"
             break
     # A hovering UAV is away from what walks below it.
-    x, y, height = start_m(scenario, map)
+    x, y, height = placed.start_m
     if math.dist(at, (x, y)) < UAV_CLEARANCE_M and kind.top_m + UAV_CLEARANCE_M > height:
         yield f"{name} starts at the UAV"
-    if math.dist(at, marker) < scenario.task.marker.half_diagonal_m + kind.radius_m:
+    if math.dist(at, placed.marker_m) < marker.half_diagonal_m + kind.radius_m:
         yield f"{name} starts on or over the marker"
     for other, other_kind in map.present_objects[:index]:
         near = kind.radius_m + OBJECT_TYPES[other_kind].radius_m
-        if math.dist(at, object_start_m(scenario, map, other)) < near:
+        if math.dist(at, placed.npc(other).start_m) < near:
             yield f"{name} starts inside {other}"

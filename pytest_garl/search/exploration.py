@@ -10,7 +10,7 @@ import numpy as np
 
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import told_position_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.search.columns import STRATA, Columns, OptionalGene
 from pytest_garl.search.operators import Matrix
 
@@ -142,7 +142,7 @@ class Exploration:
         """Return the decoy that lies nearest to the way to the coordinate that the UAV is told."""
         scenario = decode(row, self._columns.genome, map=self._map.name, seed=0)
         start, middle = np.array(self._map.uav_start_m[:2]), np.array(self._map.gps_position_m)
-        way = np.array(told_position_m(scenario, self._map)) - start
+        way = np.array(Placed(scenario, self._map).told_m) - start
         first = gene.place - gene.values.start
 
         def off_way_m(values: Matrix) -> float:

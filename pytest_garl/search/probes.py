@@ -23,14 +23,8 @@ from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.groups import DECOY_KINDS, DECOY_REACH_M
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import (
-    map_in,
-    marker_genes,
-    marker_position_m,
-    told_position_m,
-)
+from pytest_garl.scenarios.placed import Placed, marker_genes
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.start import hovers
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import problems, repair
 from pytest_garl.simulation.camera.cover_event import renderer_of
@@ -221,8 +215,9 @@ def _other_markers(twin: Flight, clear: Scenario, map: Map, limits: Limits) -> _
     side_m = clear.task.marker.side_m
     wanted_m = max(2.5 * side_m, 0.4 * _top_m(twin), 1.5 * limits.distance_m)
     away_m = round(min(wanted_m, DECOY_REACH_M), 1)
-    (x, y), (east, north) = marker_position_m(clear, map), map.gps_position_m
-    told_x, told_y = told_position_m(clear, map)
+    placed = Placed(clear, map)
+    (x, y), (east, north) = placed.marker_m, map.gps_position_m
+    told_x, told_y = placed.told_m
     inward = math.atan2(told_y - y, told_x - x)
     places = [
         (x - east + away_m * math.cos(angle), y - north + away_m * math.sin(angle))
@@ -264,12 +259,11 @@ def _thick_air(twin: Flight, clear: Scenario, map: Map, camera: Camera) -> _Made
 
 def _readable_from_m(scenario: Scenario, map: Map, camera: Camera, top_m: float) -> float:
     """Return the greatest height above the marker from which it can be read; 0 from none."""
-    place = map_in(scenario, map)
-    renderer = renderer_of(scenario, place, true_camera(camera, scenario), colour=False)
-    marker = marker_position_m(scenario, map)
+    placed = Placed(scenario, map)
+    renderer = renderer_of(placed, true_camera(camera, scenario), colour=False)
     for step in range(HEIGHTS, 0, -1):
         height = top_m * step / HEIGHTS
-        frame = renderer.render(eye_under((*marker, height), LEVEL), LEVEL, 0.0, [])
+        frame = renderer.render(eye_under((*placed.marker_m, height), LEVEL), LEVEL, 0.0, [])
         if readable_probability(frame.marker) >= READABLE:
             return height
     return 0.0
@@ -296,7 +290,7 @@ def _start_probe(
     """Return the probe whose marker lies at that side (x, y) of the start where most is free."""
     made = [(away, scenario.replace(_with_marker_at(scenario, map, away))) for away in sides]
     away, placed = max(made, key=lambda each: _free_places(each[1], map))
-    where = "the start" if hovers(scenario) else "the coordinate"
+    where = "the start" if scenario.task.start.hovers else "the coordinate"
     far = f"{math.hypot(*away):g} m {compass_point(*away)} of" if any(away) else "below"
     return _probe(name, f"the marker lies {far} {where}", placed, map, domain)
 
@@ -304,7 +298,7 @@ def _start_probe(
 def _free_places(scenario: Scenario, map: Map) -> int:
     """Return how free a place of the marker is: whether it is valid, and how many of its sides."""
     discs = [disc for body in map.bodies for disc in discs_of(body)]
-    x, y = marker_position_m(scenario, map)
+    x, y = Placed(scenario, map).marker_m
     sides = (
         (x + dx * BESIDE_M, y + dy * BESIDE_M) for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1))
     )
@@ -317,12 +311,12 @@ def _free_places(scenario: Scenario, map: Map) -> int:
 
 def _with_marker_at(clear: Scenario, map: Map, away: tuple[float, float]) -> Mapping[str, float]:
     """Return the values with which the marker lies so far (x, y) from the start."""
-    offset = clear.task.start.offset_m if hovers(clear) else (0.0, 0.0)
+    offset = clear.task.start.offset_m if clear.task.start.hovers else (0.0, 0.0)
     dx, dy = away[0] + offset[0], away[1] + offset[1]
     if clear["told.surveyed"] >= 0.5:
         towards = math.degrees(math.atan2(-dy, -dx)) % 360 if dx or dy else 0.0
         return {"told.error_m": math.hypot(dx, dy), "told.towards_deg": towards}
-    told = told_position_m(clear, map)
+    told = Placed(clear, map).told_m
     return marker_genes((told[0] + dx, told[1] + dy), map)
 
 

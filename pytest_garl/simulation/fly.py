@@ -14,7 +14,7 @@ from pytest_garl.flight.flight_file import hash_of
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import map_in
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.loop import Loop
 from pytest_garl.simulation.nominal import with_nominal_landing
@@ -38,10 +38,10 @@ def fly(
     exception, its SystemExit included; KeyboardInterrupt passes through.
     """
     began = time.perf_counter()
-    place = map_in(scenario, map or load_map(scenario.map))
-    loop = Loop(scenario, system, npcs.make, place, time_limit_s, guard)
+    placed = Placed(scenario, map or load_map(scenario.map))
+    loop = Loop(placed, system, npcs.make, time_limit_s, guard)
     flight = dataclasses.replace(
-        with_nominal_landing(loop.run(), scenario, place, loop.camera),
+        with_nominal_landing(loop.run(), placed, loop.camera),
         conditions=tuple(each.cause for each in active_conditions(scenario)),
         cpu=dispatched(),
         versions=tuple((name, version(name)) for name in PACKAGES),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps.map import Layer
-from pytest_garl.scenarios.placement import PlacedMarker
+from pytest_garl.scenarios.placed import PlacedMarker
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.ground import shadow_of
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls

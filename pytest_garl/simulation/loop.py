@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 from pytest_garl.flight.flight import Crash, Flight, Outcome
@@ -13,9 +12,7 @@ from pytest_garl.flight.landing_phases import LandingPhases
 from pytest_garl.flight.thresholds import up_m
 from pytest_garl.landing_system import Abort, Command, Land, VehicleState
 from pytest_garl.scenarios.bodies import rotate
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import marker_position_m, pad_of
-from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.contacts import Contacts
 from pytest_garl.simulation.environment import changed
@@ -31,7 +28,6 @@ from pytest_garl.simulation.physics.vehicle import (
     Quaternion,
     Thrusts,
     Vector,
-    VehicleModel,
     drag,
     lag,
     vehicle_model,
@@ -60,24 +56,29 @@ class Loop:
 
     def __init__(
         self,
-        scenario: Scenario,
+        placed: Placed,
         system: Callable[[], Any],
         policy: Callable[[], NpcPolicy],
-        map: Map,
         time_limit_s: float,
         guard: StepGuard | None,
     ) -> None:
-        self.scenario, self.map = scenario, map
+        scenario, map = placed.scenario, placed.map
+        self.scenario, self.map, self._placed = scenario, map, placed
         self._time_limit_s = time_limit_s
         self._system = SystemUnderTest(system, guard)
         self.camera = self._system.airframe.camera
-        self.marker_m = marker_position_m(scenario, map)
         self._model = vehicle_model(self._system.airframe)
-        self.npcs = [Npc(scenario, map, name, policy()) for name, _ in map.present_objects]
-        self._world = _world(self._model, map, self.npcs)
-        self._thrusts, self._command = begin_at_start(self._world, self._model, scenario, map)
-        self.recorder = Recorder(map, self.npcs, pad_of(scenario, map))
-        stays = GroundStays(self.recorder, self._model, self.marker_m, partial(_under, self))
+        self.npcs = [Npc(placed, name, policy()) for name, _ in map.present_objects]
+        self._world = World(
+            self._model,
+            map.uav_start_m,
+            map.bodies,
+            [npc.body for npc in self.npcs],
+            FEET_FRICTION[map.ground.texture],
+        )
+        self._thrusts, self._command = begin_at_start(self._world, self._model, placed)
+        self.recorder = Recorder(placed, self.npcs)
+        stays = GroundStays(self.recorder, self._model, placed.marker_m, self._under)
         self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m, stays)
         self._control = FlightControl(self._model)
         self._wind = Wind(scenario, map.ground.texture)
@@ -119,15 +120,14 @@ class Loop:
         self.recorder.begin(*self._world.uav_state()[:3])
         self._system.start(
             mission_for(
-                self.scenario,
-                self.map,
+                self._placed,
                 self._system.airframe,
                 self._time_limit_s,
                 error_m=self._navigation.error_m,
             )
         )
         if self._system.needs_camera:
-            self._sensors.switch_on(self.scenario, self.map)
+            self._sensors.switch_on(self._placed)
 
     def close(self) -> None:
         """Free the physics."""
@@ -216,7 +216,36 @@ class Loop:
     def situation(self, npc: Npc) -> Situation:
         """Return what the policy of an NPC may see at this moment."""
         position, _, velocity, _ = self._world.uav_state()
-        return _situation(self, npc, position, velocity)
+        return Situation(
+            time_s=self.recorder.time_s,
+            self=npc.state,
+            others=tuple(other.state for other in self.npcs if other is not npc),
+            uav_position_m=position,
+            uav_velocity_mps=velocity,
+            marker_position_m=self._placed.marker_m,
+            map=self.map,
+            scenario=self.scenario,
+            phases_s=self.phases.began_s,
+        )
+
+    def _under(self, place: tuple[float, float]) -> str:
+        """Return what lies under the UAV if it touches down at a place at this moment."""
+        bodies = (*self.map.bodies, *(npc.body for npc in self.npcs))
+        pad = self._placed.pad
+        layers = (*self.map.ground.layers, *(each.layer for each in pad.decoys))
+        return what_lies_under(place, pad.main, layers, bodies, self.scenario)
+
+    def _truth(self, error_m: Vector) -> Truth:
+        """Return the truth in the frame of the estimated position, in which the pilot flies."""
+        dx, dy, dz = error_m
+        objects = []
+        for npc in self.npcs:
+            x, y, z = npc.position_m
+            velocity = npc.vx_mps, npc.vy_mps
+            place = x + dx, y + dy, z + dz
+            objects.append(TruthObject(position_m=place, velocity_mps=velocity, type=npc.type))
+        x, y = self._placed.marker_m
+        return Truth(marker_m=(x + dx, y + dy), objects=tuple(objects), map=self.map)
 
     def eye(self) -> tuple[Vector, Quaternion]:
         """Return the camera's place and the UAV's attitude."""
@@ -236,7 +265,7 @@ class Loop:
 
     def _step(self, tick: int, delivery: Delivery) -> None:
         if self._system.told:
-            self._system.told.observe_truth(_truth(self, self._navigation.error_m))
+            self._system.told.observe_truth(self._truth(self._navigation.error_m))
         command = self._system.step(delivery.observation)
         error_m = estimation_error_m(delivery.observation, delivery.place_m)
         self.recorder.step(command, delivery.sight, error_m, delivery.range_m)
@@ -266,33 +295,6 @@ def _after_closing(
     return outcome, crash
 
 
-def _world(model: VehicleModel, map: Map, npcs: Sequence[Npc]) -> World:
-    moving = [npc.body for npc in npcs]
-    return World(model, map.uav_start_m, map.bodies, moving, FEET_FRICTION[map.ground.texture])
-
-
-def _situation(loop: Loop, npc: Npc, position: Vector, velocity: Vector) -> Situation:
-    return Situation(
-        time_s=loop.recorder.time_s,
-        self=npc.state,
-        others=tuple(other.state for other in loop.npcs if other is not npc),
-        uav_position_m=position,
-        uav_velocity_mps=velocity,
-        marker_position_m=marker_position_m(loop.scenario, loop.map),
-        map=loop.map,
-        scenario=loop.scenario,
-        phases_s=loop.phases.began_s,
-    )
-
-
-def _under(loop: Loop, place: tuple[float, float]) -> str:
-    """Return what lies under the UAV if it touches down at a place at this moment."""
-    map, bodies = loop.map, (*loop.map.bodies, *(npc.body for npc in loop.npcs))
-    pad = pad_of(loop.scenario, map)
-    layers = (*map.ground.layers, *(each.layer for each in pad.decoys))
-    return what_lies_under(place, pad.main, layers, bodies, loop.scenario)
-
-
 def _vehicle_state(tick: int, motion: Motion, thrusts: Thrusts) -> VehicleState:
     return VehicleState(
         time_s=tick / PHYSICS_RATE_HZ,
@@ -311,16 +313,3 @@ def _is_finite(world: World) -> bool:
 def _ticks_per_call(rate_hz: float | None) -> int:
     """Return how many physics steps lie between two calls at a rate; 1 without one."""
     return max(1, round(PHYSICS_RATE_HZ / rate_hz)) if rate_hz else 1
-
-
-def _truth(loop: Loop, error_m: Vector) -> Truth:
-    """Return the truth in the frame of the estimated position, in which the pilot flies."""
-    dx, dy, dz = error_m
-    objects = []
-    for npc in loop.npcs:
-        x, y, z = npc.position_m
-        velocity = npc.vx_mps, npc.vy_mps
-        place = x + dx, y + dy, z + dz
-        objects.append(TruthObject(position_m=place, velocity_mps=velocity, type=npc.type))
-    x, y = loop.marker_m
-    return Truth(marker_m=(x + dx, y + dy), objects=tuple(objects), map=loop.map)

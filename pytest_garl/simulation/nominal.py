@@ -16,10 +16,7 @@ from typing import Literal
 
 from pytest_garl.flight.flight import Flight, NominalView, ObjectRecord
 from pytest_garl.landing_system import Camera
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import marker_position_m, told_position_m
-from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.start import start_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.solids import BodyPose
@@ -62,22 +59,20 @@ class _Look:
     height_m: float
 
 
-def nominal_arrival_s(scenario: Scenario, map: Map) -> float:
+def nominal_arrival_s(placed: Placed) -> float:
     """Return when a pilot that knows the marker's place is above it: the reference pilot."""
-    start = start_m(scenario, map)
-    return _up_s(start[2]) + _across_s(start[:2], marker_position_m(scenario, map))
+    start = placed.start_m
+    return _up_s(start[2]) + _across_s(start[:2], placed.marker_m)
 
 
-def nominal_landing_s(scenario: Scenario, map: Map) -> float:
+def nominal_landing_s(placed: Placed) -> float:
     """Return when a pilot that knows the marker's place has landed on it without waiting."""
     slow = (SLOW_BELOW_M - LAND_BELOW_M) / (DESCENT_MPS / 2)
     descent_s = (SEARCH_ALTITUDE_M - SLOW_BELOW_M) / DESCENT_MPS + slow
-    return nominal_arrival_s(scenario, map) + descent_s
+    return nominal_arrival_s(placed) + descent_s
 
 
-def nominal_views(
-    flight: Flight, scenario: Scenario, map: Map, camera: Camera
-) -> tuple[NominalView, ...]:
+def nominal_views(flight: Flight, placed: Placed, camera: Camera) -> tuple[NominalView, ...]:
     """Return the views of a nominal landing in the scenario that was flown.
 
     The objects are where they were at that time of the flight, or at its end if it had ended; the
@@ -85,10 +80,11 @@ def nominal_views(
     A camera that fails shows nothing.  The camera is the true one, turned and dirty as the
     scenario says; it hovers while it looks, so that a long exposure does not blur.
     """
-    renderer = renderer_of(scenario, map, true_camera(camera, scenario), colour=False)
+    scenario = placed.scenario
+    renderer = renderer_of(placed, true_camera(camera, scenario), colour=False)
     attitude = Mounting(scenario).attitude(LEVEL)
     shown, views, outage = scenario, [], Event(scenario, "outage")
-    for look in _looks(scenario, map):
+    for look in _looks(placed):
         present = environment_at(scenario, flight, look.time_s)
         if present != shown:
             renderer.change(present)
@@ -112,20 +108,20 @@ def nominal_views(
     return tuple(views)
 
 
-def with_nominal_landing(flight: Flight, scenario: Scenario, map: Map, camera: Camera) -> Flight:
+def with_nominal_landing(flight: Flight, placed: Placed, camera: Camera) -> Flight:
     """Return the flight with what a nominal landing takes, and sees if this one was given up."""
     given_up = flight.outcome in ("gave_up", "not_landed")
     return dataclasses.replace(
         flight,
-        nominal_views=nominal_views(flight, scenario, map, camera) if given_up else (),
-        nominal_arrival_s=nominal_arrival_s(scenario, map),
-        nominal_landing_s=nominal_landing_s(scenario, map),
+        nominal_views=nominal_views(flight, placed, camera) if given_up else (),
+        nominal_arrival_s=nominal_arrival_s(placed),
+        nominal_landing_s=nominal_landing_s(placed),
     )
 
 
-def _looks(scenario: Scenario, map: Map) -> Iterator[_Look]:
+def _looks(placed: Placed) -> Iterator[_Look]:
     """Yield the looks in the order of time, none longer than ``_LONGEST_LOOK_S``."""
-    for look in _stays(scenario, map):
+    for look in _stays(placed):
         count = math.ceil(look.duration_s / _LONGEST_LOOK_S)
         for index in range(count):
             yield dataclasses.replace(
@@ -135,12 +131,11 @@ def _looks(scenario: Scenario, map: Map) -> Iterator[_Look]:
             )
 
 
-def _stays(scenario: Scenario, map: Map) -> Iterator[_Look]:
+def _stays(placed: Placed) -> Iterator[_Look]:
     """Yield where a nominal landing stays, from when on, and for how long."""
-    told, marker = told_position_m(scenario, map), marker_position_m(scenario, map)
+    told, marker, start = placed.told_m, placed.marker_m, placed.start_m
     turns = [2 * math.pi * index / RING_PLACES for index in range(RING_PLACES)]
     ring = [(told[0] + RING_M * math.cos(a), told[1] + RING_M * math.sin(a)) for a in turns]
-    start = start_m(scenario, map)
     now = _up_s(start[2]) + _across_s(start[:2], told)
     stay_s = 2 * RING_M * math.sin(math.pi / RING_PLACES) / SEARCH_MPS
     for place in (told, *ring):

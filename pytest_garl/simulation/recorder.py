@@ -25,8 +25,7 @@ from pytest_garl.flight.flight import (
     Track,
 )
 from pytest_garl.landing_system import Command
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import Pad
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.physics.npc import Npc
@@ -49,10 +48,10 @@ class Sight:
 class Recorder:
     """Collects poses, contacts, events and steps; ``time_s`` is the flight's present time."""
 
-    def __init__(self, map: Map, objects: Sequence[Npc], pad: Pad) -> None:
+    def __init__(self, placed: Placed, objects: Sequence[Npc]) -> None:
         self.time_s = 0.0
-        self._objects, self._marker = objects, pad.place_m
-        layers = (*map.ground.layers, *(each.layer for each in pad.decoys))
+        self._objects, self._marker, map = objects, placed.marker_m, placed.map
+        layers = (*map.ground.layers, *(each.layer for each in placed.decoys))
         self._decoys = tuple(
             (each.name, *each.points_m[0]) for each in layers if each.kind == "marker"
         )

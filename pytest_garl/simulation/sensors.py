@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from pytest_garl.landing_system import Camera, Observation
 from pytest_garl.scenarios.bodies import rotate
-from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.depth_sensor import DepthSensor
@@ -76,11 +76,11 @@ class Sensors:
         self._poses: deque[Motion] = deque(maxlen=1 + max(0, -self._timing.stamp_ticks))
         self._under_way: deque[tuple[int, Delivery]] = deque()
 
-    def switch_on(self, scenario: Scenario, map: Map) -> None:
+    def switch_on(self, placed: Placed) -> None:
         """Switch the camera on; without it frames are black and show nothing."""
-        camera = true_camera(self._camera, scenario)
-        self._renderer = renderer_of(scenario, map, camera)
-        self._depth = DepthSensor(scenario, camera)
+        camera = true_camera(self._camera, placed.scenario)
+        self._renderer = renderer_of(placed, camera)
+        self._depth = DepthSensor(placed.scenario, camera)
 
     def change(self, scenario: Scenario) -> None:
         """Show another environment from the next picture on."""

@@ -15,7 +15,7 @@ from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.npcs.recorded import recorded_spec
 from pytest_garl.scenarios.files import is_in_units
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.placement import object_speed_mps, object_type
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
@@ -90,7 +90,8 @@ def test_shorter_record_ends_where_the_longer_one_ends() -> None:
     ends = [f.objects[1].track.position_m[-1, :2] for f in (flight, last)]
     # It starts from standing where the longer one walked by, so it falls behind: by v² / 2a while
     # it gains speed, and by v t while it turns from where it faced, half around at most.
-    speed_mps, kind = object_speed_mps(SCENARIO, LAWN, name), object_type(SCENARIO, LAWN, name)
+    npc = Placed(SCENARIO, LAWN).npc(name)
+    speed_mps, kind = npc.speed_mps, npc.type
     gaining_m = speed_mps**2 / (2 * kind.acceleration_mps2)
     z, w = last.objects[1].track.attitude[0, 2:]
     along = ends[1] - last.objects[1].track.position_m[0, :2]

@@ -20,7 +20,7 @@ from pytest_garl.cases.straight_crossing import (
 from pytest_garl.flight.flight import Flight
 from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import marker_position_m, object_speed_mps, object_start_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.story import story_of
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.simulation.fly import fly
@@ -55,12 +55,12 @@ def test_object_alone_starts_far_away_and_crosses_the_place_in_time() -> None:
     assert (story.grade, story.phase, story.pause_s) == ("careless", 0, 0.0)
     assert {*scenario.removed_objects} == {"person-2", "bird-1", "dog-1"}
     assert problems(scenario, LAWN) == ()
-    marker, start = marker_position_m(scenario, LAWN), object_start_m(scenario, LAWN, "person-1")
+    marker, start = Placed(scenario, LAWN).marker_m, Placed(scenario, LAWN).npc("person-1").start_m
     place = marker[0] + story.crossing_m[0], marker[1] + story.crossing_m[1]
     assert math.dist(place, MET.place_m[:2]) < 2e-3
     assert FARTHEST_M - 1 < math.dist(start, place) <= FARTHEST_M
     assert story.delay_s % 0.5 == 0
-    assert object_speed_mps(scenario, LAWN, "person-1") == pytest.approx(1.4)
+    assert Placed(scenario, LAWN).npc("person-1").speed_mps == pytest.approx(1.4)
     course = math.atan2(place[1] - start[1], place[0] - start[0])
     dx, dy = walked_m(PERSON, 1.4, course, MET.time_s - story.delay_s)
     assert math.dist((start[0] + dx, start[1] + dy), place) < 0.15
@@ -111,11 +111,11 @@ def test_way_does_not_lead_through_something_solid() -> None:
     at = (x + 4.0, y)
     met = dataclasses.replace(MET, place_m=(*at, 0.0), course_rad=0.0)
     scenario = crossing(met)
-    start = object_start_m(scenario, LAWN, "person-1")
+    start = Placed(scenario, LAWN).npc("person-1").start_m
     assert 1.0 < start[0] - x < 2.0
     # So near that nobody can start in between.
     met = dataclasses.replace(met, place_m=(x + 1.0, y, 0.0))
-    turned = object_start_m(crossing(met), LAWN, "person-1")
+    turned = Placed(crossing(met), LAWN).npc("person-1").start_m
     assert abs(math.atan2(y - turned[1], x + 1.0 - turned[0])) > 0.1
 
 

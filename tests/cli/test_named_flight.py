@@ -24,7 +24,7 @@ from pytest_garl.flight.flight_file import save
 from pytest_garl.plugin import case_tests
 from pytest_garl.reports.mcap.source import Place
 from pytest_garl.scenarios.files import dumps
-from pytest_garl.scenarios.placement import map_in
+from pytest_garl.scenarios.placed import Placed
 from tests.cases.samples import LAWN
 from tests.cases.samples import case as dog_case
 from tests.reports.html.test_report import lost
@@ -215,7 +215,7 @@ def test_a_case_has_the_camera_of_its_system(case: Path, before: str) -> None:
     assert found.signature == "IV:dog:last-metre:unseen"
     scenario = dog_case().scenario
     camera = Hovers.airframe.camera
-    assert found.place == Place(scenario=scenario, map=map_in(scenario, LAWN), camera=camera)
+    assert found.place == Place(scenario=scenario, map=Placed(scenario, LAWN).map, camera=camera)
     assert find(f"{before}{case.stem}-live").name == f"{dog_case().id}-live"
 
 

@@ -11,6 +11,7 @@ import pytest
 from landing_systems.modules.detection_opencv import OpenCvDetector
 from pytest_garl import Camera, Detection, Mission, Observation
 from pytest_garl.fiducial import DICTIONARIES, MarkerSpec
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.task import Task
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.randomness import generator
@@ -24,7 +25,7 @@ def detections(
 ) -> tuple[tuple[Detection, ...], tuple[float, float]]:
     """Return what is found straight above a marker, and where the marker lies."""
     scenario = dataclasses.replace(nominal(), task=Task(marker=marker))
-    renderer = Renderer(scenario, EMPTY, camera, generator(scenario.seed, "sensor"))
+    renderer = Renderer(Placed(scenario, EMPTY), camera, generator(scenario.seed, "sensor"))
     x, y = renderer.marker_m
     frame = renderer.render((x, y, height_m), LEVEL, 0.0, [])
     mission = Mission(

@@ -13,7 +13,7 @@ from pytest_garl.npcs.way_out import LANDING_ZONE_M
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.placement import start_genes
+from pytest_garl.scenarios.placed import Placed, start_genes
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Situation
@@ -38,7 +38,7 @@ def walked(
     scenario = decode(GENOME.nominal, GENOME, map="lawn", seed=1)
     genes = {**start_genes(name, start, LAWN), f"{name}.velocity": 0.5}
     scenario = scenario.replace(genes)
-    thing = Npc(scenario, LAWN, name, recorded_spec({name: moves}).make())
+    thing = Npc(Placed(scenario, LAWN), name, recorded_spec({name: moves}).make())
     situation = Situation(
         time_s=0.0,
         self=thing.state,
@@ -143,7 +143,7 @@ def test_policy_takes_over_from_recorded_moves_at_a_time() -> None:
     scenario = decode(GENOME.nominal, GENOME, map="lawn", seed=1)
     live = policy_spec("greedy")
     recorded = recorded_spec({name: ((0.0, 1.0),) * 10 for name, _ in LAWN.present_objects})
-    npc = Npc(scenario, LAWN, "dog-1", handed_over_spec(recorded, live, 1.2).make())
+    npc = Npc(Placed(scenario, LAWN), "dog-1", handed_over_spec(recorded, live, 1.2).make())
     situation = Situation(
         time_s=0.0,
         self=npc.state,

@@ -18,7 +18,7 @@ from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.groups import DECOY_KINDS
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.placement import decoys_of, marker_position_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.units import conditions_in_words
@@ -47,8 +47,8 @@ def test_decoys_are_moved_off_the_marker_and_off_each_other(name: str) -> None:
         assert problems(scenario, MAPS[name]) == ()
         assert repair(scenario, MAPS[name]) == scenario
         assert loads(dumps(scenario, MAPS[name]), MAPS[name]) == scenario
-        places = [each.place_m for each in decoys_of(scenario, MAPS[name])]
-        places.append(marker_position_m(scenario, MAPS[name]))
+        places = [each.place_m for each in Placed(scenario, MAPS[name]).decoys]
+        places.append(Placed(scenario, MAPS[name]).marker_m)
         places += [each.points_m[0] for each in MAPS[name].ground.layers if each.kind == "marker"]
         gaps = [
             np.hypot(a[0] - b[0], a[1] - b[1])
@@ -67,7 +67,7 @@ def test_every_kind_is_seen_on_both_maps(name: str, kind: int) -> None:
         scenario = scenario_on(name, values)
         camera = Camera()
         place = MAPS[name]
-        renderer = Renderer(scenario, place, camera, generator(scenario.seed, "sensor"))
+        renderer = Renderer(Placed(scenario, place), camera, generator(scenario.seed, "sensor"))
         frame = renderer.render((4.0, -4.0, 4.0), (0.0, 0.0, 0.0, 1.0), 0.0, [])
         pictures.append(frame.image.astype(int))
         grey = cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY)
@@ -84,12 +84,12 @@ def test_every_kind_is_seen_on_both_maps(name: str, kind: int) -> None:
 
 
 def test_a_scenario_without_decoys_has_none() -> None:
-    assert decoys_of(scenario_on("lawn", {}), EMPTY) == ()
+    assert Placed(scenario_on("lawn", {}), EMPTY).decoys == ()
 
 
 def test_an_active_decoy_has_a_kind_and_a_cause_names_it_by_that() -> None:
     values = {"decoy-1.kind": 0.01, "decoy-2.kind": 0.9, "decoy-2.x_m": 5.0}
-    found = decoys_of(scenario_on("lawn", values), MAPS["lawn"])
+    found = Placed(scenario_on("lawn", values), MAPS["lawn"]).decoys
     assert [each.kind for each in found] == ["other-id", "other-id"]
     assert {each.layer.name for each in found} == {"decoy-other-id"}
 
@@ -98,7 +98,7 @@ def test_another_id_is_not_one_of_the_board() -> None:
     nested = (NestedMarker(id=1, side_m=0.3), NestedMarker(id=2, side_m=0.2, offset_m=(0.5, 0.0)))
     scenario = scenario_on("lawn", {"decoy-1.kind": 1.0})
     scenario = dataclasses.replace(scenario, task=Task(marker=MarkerSpec(nested=nested)))
-    assert [each.id for each in decoys_of(scenario, MAPS["lawn"])] == [3]
+    assert [each.id for each in Placed(scenario, MAPS["lawn"]).decoys] == [3]
 
 
 def test_a_decoy_without_room_is_left_out() -> None:
@@ -108,7 +108,7 @@ def test_a_decoy_without_room_is_left_out() -> None:
     scenario = decode(genome.nominal, genome, map="lawn", seed=5).replace(values)
     scenario = repair(dataclasses.replace(scenario, task=Task(marker=wide)), MAPS["lawn"])
     assert problems(scenario, MAPS["lawn"]) == ()
-    assert decoys_of(scenario, MAPS["lawn"]) == ()
+    assert Placed(scenario, MAPS["lawn"]).decoys == ()
     assert repair(scenario, MAPS["lawn"]) == scenario
 
 
@@ -126,7 +126,7 @@ def test_a_file_states_the_name_of_the_kind_and_may_state_its_number(number: int
 def test_a_decoy_whose_kind_is_none_is_not_there() -> None:
     scenario = scenario_on("lawn", {"decoy-1.kind": 5.0, "decoy-1.x_m": 4.0})
     text = dumps(scenario, MAPS["lawn"]).replace('"window"', '"none"')
-    assert decoys_of(loads(text, MAPS["lawn"]), MAPS["lawn"]) == ()
+    assert Placed(loads(text, MAPS["lawn"]), MAPS["lawn"]).decoys == ()
 
 
 @pytest.mark.parametrize("found", ["'helipad'", "8", "-1", "true", "['window']", "nan"])

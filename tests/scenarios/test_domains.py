@@ -21,7 +21,7 @@ from pytest_garl.scenarios.genes import Genome, active_genes, genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.groups import GROUPS, QUANTITIES
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.placement import marker_position_m, told_position_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.units import sections_of
 from pytest_garl.scenarios.validity import repair
@@ -162,7 +162,7 @@ def test_half_of_the_active_draws_lie_in_the_outer_third() -> None:
 
 def test_the_told_coordinate_of_field_is_about_the_marker() -> None:
     for scenario in drawn(FIELD, 200):
-        told, marker = told_position_m(scenario, COURT), marker_position_m(scenario, COURT)
+        told, marker = Placed(scenario, COURT).told_m, Placed(scenario, COURT).marker_m
         assert np.hypot(told[0] - marker[0], told[1] - marker[1]) <= 5.0 + 1e-3
 
 

@@ -10,12 +10,7 @@ from hypothesis import strategies as st
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.placement import (
-    disc_to_square,
-    marker_position_m,
-    square_to_disc,
-    told_position_m,
-)
+from pytest_garl.scenarios.placed import Placed, disc_to_square, square_to_disc
 
 
 def test_uniform_genes_give_a_uniform_disc() -> None:
@@ -37,9 +32,9 @@ def test_the_told_coordinate_is_the_maps_or_the_markers_and_has_an_error() -> No
     genome = genome_for(court)
     plain = decode(genome.nominal, genome, map="court", seed=1)
     plain = plain.replace({"marker.x": 0.5, "marker.y": -0.4})
-    marker = marker_position_m(plain, court)
-    assert told_position_m(plain, court) == court.gps_position_m != marker
+    marker = Placed(plain, court).marker_m
+    assert Placed(plain, court).told_m == court.gps_position_m != marker
     surveyed = plain.replace({"told.surveyed": 1.0})
-    assert told_position_m(surveyed, court) == marker
+    assert Placed(surveyed, court).told_m == marker
     north = surveyed.replace({"told.error_m": 4.0, "told.towards_deg": 90.0})
-    assert told_position_m(north, court) == pytest.approx((marker[0], marker[1] + 4.0))
+    assert Placed(north, court).told_m == pytest.approx((marker[0], marker[1] + 4.0))

@@ -13,7 +13,7 @@ from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.placement import map_in, object_type
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, LIMITS_S, STORY, story_of
 from pytest_garl.scenarios.validity import repair
@@ -99,9 +99,9 @@ def test_a_story_without_a_grade_is_refused() -> None:
 def test_a_child_is_smaller_and_hit_as_a_child() -> None:
     child = scenario_with("person-2", (5.0, 5.0), 2.0, {"body": 1.0})
     adult = scenario_with("person-2", (5.0, 5.0), 2.0, {})
-    assert object_type(child, LAWN, "person-2").height_m < 1.2
-    assert object_type(adult, LAWN, "person-2").height_m > 1.7
-    assert dict(map_in(child, LAWN).present_objects) == {"person-2": "child"}
+    assert Placed(child, LAWN).npc("person-2").type.height_m < 1.2
+    assert Placed(adult, LAWN).npc("person-2").type.height_m > 1.7
+    assert dict(Placed(child, LAWN).map.present_objects) == {"person-2": "child"}
     again = loads(dumps(repair(child, LAWN), LAWN), LAWN)
     assert story_of(again, "person-2") == story_of(repair(child, LAWN), "person-2")
 

@@ -16,6 +16,7 @@ from pytest_garl.scenarios.files import dump_scenario, dumps, loads, parse_scena
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.scenarios.validity import clearance_m, problems, repair
@@ -84,7 +85,7 @@ def test_a_map_states_its_marker(tmp_path: Path) -> None:
     yard = load_map("yard", (tmp_path,))
     assert yard.marker == MarkerSpec(dictionary="DICT_APRILTAG_36h11", id=5, side_m=0.5)
     drawn = random_scenarios(yard, genome_for(yard), 1, 0, 1)[0]
-    mission = mission_for(drawn, yard, Airframe(), 60.0)
+    mission = mission_for(Placed(drawn, yard), Airframe(), 60.0)
     assert (mission.marker_dictionary, mission.marker_id) == ("DICT_APRILTAG_36h11", 5)
     assert mission.marker_side_m == 0.5
     (tmp_path / "broken.toml").write_text(text + table.replace("id = 5", "id = -1"))
@@ -93,7 +94,7 @@ def test_a_map_states_its_marker(tmp_path: Path) -> None:
 
 
 def test_a_mission_names_the_nested_markers() -> None:
-    mission = mission_for(scenario(), COURT, Airframe(), 60.0)
+    mission = mission_for(Placed(scenario(), COURT), Airframe(), 60.0)
     assert mission.nested_markers == TASK.marker.nested
 
 

@@ -16,7 +16,7 @@ from pytest_garl.scenarios.groups import GROUPS, QUANTITIES
 from pytest_garl.scenarios.maps.loading import load_map, map_names
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M
-from pytest_garl.scenarios.placement import MARKER_RADIUS_M, marker_genes, marker_position_m
+from pytest_garl.scenarios.placed import MARKER_RADIUS_M, Placed, marker_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.scenarios.units import from_sections, sections_of, snapped
@@ -83,7 +83,7 @@ def test_snapping_keeps_a_marker_at_the_edge_of_its_disc_inside(angle: float) ->
     place = sections_of(once, COURT)["marker"]
     assert math.dist((place["x_m"], place["y_m"]), (x, y)) <= MARKER_RADIUS_M
     # Half a millimetre each way by rounding, or one each way back into the disc.
-    assert math.dist(marker_position_m(once, COURT), edge) < 0.0022
+    assert math.dist(Placed(once, COURT).marker_m, edge) < 0.0022
 
 
 def test_a_file_takes_a_condition_that_counts_to_the_nearest_whole_number() -> None:
@@ -109,7 +109,7 @@ def test_snapping_moves_nothing_by_more_than_its_last_digit() -> None:
     assert scenario["environment.fog"] == pytest.approx(0.1234567, rel=1e-4)
     assert scenario["environment.rain"] == pytest.approx(0.1234567, rel=1e-4)
     assert scenario["wind.mean_mps"] == 1.2346
-    assert math.dist(marker_position_m(scenario, COURT), marker_position_m(raw, COURT)) < 0.001
+    assert math.dist(Placed(scenario, COURT).marker_m, Placed(raw, COURT).marker_m) < 0.001
     sections = sections_of(scenario, COURT)
     assert from_sections(sections, scenario, COURT) == scenario
 

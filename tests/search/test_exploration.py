@@ -10,7 +10,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.placement import told_position_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.search.columns import STRATA, Columns
 from pytest_garl.search.exploration import Exploration
 
@@ -84,7 +84,7 @@ def test_decoys_lie_nearer_to_the_way_than_the_domain_puts_them() -> None:
             row = COLUMNS.with_active(COLUMNS.genome.random(rng), ("decoy-1",))
             row[gene.values] = ours.values(gene, row, rng)
             scenario = decode(row, COLUMNS.genome, map=MAP.name, seed=0)
-            told = np.array(told_position_m(scenario, MAP))
+            told = np.array(Placed(scenario, MAP).told_m)
             place = middle + row[gene.place : gene.place + 2]
             line = [start + share * (told - start) for share in np.linspace(0, 1, 200)]
             distances.append(min(float(np.linalg.norm(place - each)) for each in line))

@@ -17,8 +17,7 @@ from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.placement import decoys_of, marker_position_m, told_position_m
-from pytest_garl.scenarios.start import start_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.search.probes import (
@@ -64,8 +63,8 @@ def probes(domain: Domain = FIELD, camera: Camera = CAMERA) -> dict[str, Probe]:
 def test_the_twin_lands_and_its_marker_is_not_where_a_blind_landing_ends() -> None:
     assert twin().outcome == "landed"
     assert not judge(twin(), DEFAULT_LIMITS).violation
-    marker, start = marker_position_m(beside().scenario, LAWN), start_m(beside().scenario, LAWN)
-    assert math.dist(marker, start[:2]) == pytest.approx(BESIDE_M, abs=0.01)
+    placed = Placed(beside().scenario, LAWN)
+    assert math.dist(placed.marker_m, placed.start_m[:2]) == pytest.approx(BESIDE_M, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -130,10 +129,10 @@ def _objects(probe: Probe) -> list[str]:
 
 def test_the_marker_lies_within_the_triangle_of_the_others() -> None:
     probe = probes()["other-markers"]
-    x, y = marker_position_m(probe.scenario, LAWN)
+    x, y = Placed(probe.scenario, LAWN).marker_m
     angles = sorted(
         math.atan2(each.place_m[1] - y, each.place_m[0] - x)
-        for each in decoys_of(probe.scenario, LAWN)
+        for each in Placed(probe.scenario, LAWN).decoys
     )
     assert len(angles) == 3
     gaps = [b - a for a, b in itertools.pairwise(angles)]
@@ -234,9 +233,9 @@ def _raised(flight: Flight) -> Track:
 def test_a_flight_from_the_ground_arrives_beside_the_marker() -> None:
     paper = domain_named("paper")
     probe = start_beside(clear_scenario(LAWN, Task(), paper), LAWN, paper)
-    marker, told = (place(probe.scenario, LAWN) for place in (marker_position_m, told_position_m))
-    assert math.dist(marker, told) == pytest.approx(BESIDE_M, abs=0.01)
-    assert told == LAWN.gps_position_m
+    placed = Placed(probe.scenario, LAWN)
+    assert math.dist(placed.marker_m, placed.told_m) == pytest.approx(BESIDE_M, abs=0.01)
+    assert placed.told_m == LAWN.gps_position_m
     assert not probe.outside
 
 

@@ -12,7 +12,7 @@ from pytest_garl.flight.flight import Flight
 from pytest_garl.npcs.recorded import recorded_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.placement import start_genes
+from pytest_garl.scenarios.placed import start_genes
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S
 from tests.support.flights import EMPTY, LAWN, STAND, Falls, HitsATree, Scripted, nominal

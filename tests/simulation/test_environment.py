@@ -18,6 +18,7 @@ from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.npcs.recorded import recorded_spec
 from pytest_garl.scenarios.genes import ENVIRONMENT, genome_for
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.camera.renderer import Renderer
@@ -211,7 +212,7 @@ def _moves(flight: Flight) -> dict[str, list[tuple[float, float]]]:
 
 
 def _renderer(scenario: Scenario) -> Renderer:
-    return Renderer(scenario, LAWN, SMALL, generator(scenario.seed, "sensor"))
+    return Renderer(Placed(scenario, LAWN), SMALL, generator(scenario.seed, "sensor"))
 
 
 def _frame(renderer: Renderer) -> np.ndarray:

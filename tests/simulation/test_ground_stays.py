@@ -20,10 +20,9 @@ from pytest_garl import (
     VehicleState,
     VelocitySetpoint,
 )
-from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.flight.flight import Flight, Outcome, Touchdown
 from pytest_garl.flight.thresholds import GRAVITY_MPS2
-from pytest_garl.scenarios.placement import Pad
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.ground_stays import GroundStays
 from pytest_garl.simulation.physics.vehicle import REFERENCE_MASS_KG, vehicle_model
@@ -263,7 +262,7 @@ class TestGroundStays:
     """The stays by themselves, step by step."""
 
     def setup_method(self) -> None:
-        self.recorder = Recorder(EMPTY, (), Pad(spec=MarkerSpec(), place_m=(0.0, 0.0), yaw_rad=0.0))
+        self.recorder = Recorder(Placed(nominal(), EMPTY), ())
         self.stays = GroundStays(
             self.recorder, vehicle_model(Airframe()), (0.0, 0.0), lambda place: "nothing"
         )

@@ -14,7 +14,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Layer, Map
-from pytest_garl.scenarios.placement import Pad, PlacedMarker
+from pytest_garl.scenarios.placed import Pad, PlacedMarker
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera import map_texture
 from pytest_garl.simulation.camera.canvas import Canvas

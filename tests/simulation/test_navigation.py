@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pytest_garl import Abort, Airframe, Command, Mission, Observation, VehicleState
 from pytest_garl.landing_system import MotorThrusts
-from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.navigation import LAG_S, MOST_RATE_MPS, Navigation, error_m_at
 from pytest_garl.simulation.physics.vehicle import Motion
@@ -178,7 +178,7 @@ def test_the_reference_pilot_lands_on_the_marker_whatever_its_estimate_says() ->
     scenario = nominal(**BIASED, marker__x=0.3, marker__y=0.2)
     flight = fly(scenario, ReferencePilot, STAND, map=EMPTY, time_limit_s=90.0)
     assert flight.outcome == "landed"
-    assert flight.marker_position_m == marker_position_m(scenario, EMPTY)
+    assert flight.marker_position_m == Placed(scenario, EMPTY).marker_m
     assert flight.final_distance_m < 0.3
 
 

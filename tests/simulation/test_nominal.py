@@ -15,7 +15,7 @@ from pytest_garl.flight.flight import Flight, NominalView, ObjectRecord, Track
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.nominal import (
     SIGHT_HEIGHTS_M,
@@ -59,7 +59,7 @@ def given_up(map: Map, places: Mapping[str, tuple[float, float]], **genes: float
     )
     empty = fly(scenario, AbortsAtOnce, STAND, map=EMPTY, time_limit_s=20)
     moved = dataclasses.replace(empty, objects=objects)
-    views = nominal_views(moved, scenario, map, Camera())
+    views = nominal_views(moved, Placed(scenario, map), Camera())
     return dataclasses.replace(moved, nominal_views=views)
 
 
@@ -71,13 +71,13 @@ def above(flight: Flight) -> list[NominalView]:
 def test_the_reference_pilot_arrives_and_lands_when_a_nominal_landing_does(genes: Any) -> None:
     scenario = nominal(**genes)
     flight = fly(scenario, ReferencePilot, STAND, map=EMPTY)
-    away = flight.uav.position_m[:, :2] - marker_position_m(scenario, EMPTY)
+    away = flight.uav.position_m[:, :2] - Placed(scenario, EMPTY).marker_m
     arrived_s = flight.uav.time_s[np.argmax(np.hypot(*away.T) < 0.1)]
     assert flight.touchdown is not None
     assert flight.nominal_arrival_s == pytest.approx(arrived_s, abs=0.3)
     assert flight.nominal_landing_s == pytest.approx(flight.touchdown.time_s, abs=0.5)
-    assert flight.nominal_arrival_s == nominal_arrival_s(scenario, EMPTY)
-    assert flight.nominal_landing_s == nominal_landing_s(scenario, EMPTY)
+    assert flight.nominal_arrival_s == nominal_arrival_s(Placed(scenario, EMPTY))
+    assert flight.nominal_landing_s == nominal_landing_s(Placed(scenario, EMPTY))
     assert flight.nominal_views == ()
 
 
@@ -130,7 +130,7 @@ def test_a_marker_wholly_under_snow_is_hidden() -> None:
 
 
 def test_people_who_stand_on_the_marker_hide_it() -> None:
-    marker = marker_position_m(nominal(), PEOPLE)
+    marker = Placed(nominal(), PEOPLE).marker_m
     corners = [(-0.3, -0.3), (-0.3, 0.3), (0.3, -0.3), (0.3, 0.3)]
     places = {
         name: (marker[0] + dx, marker[1] + dy)

@@ -11,8 +11,8 @@ import pytest
 from pytest_garl import Command, Land, Observation, VelocitySetpoint
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.bodies import discs_of
+from pytest_garl.scenarios.placed import UAV_CLEARANCE_M, Placed
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.start import UAV_CLEARANCE_M, start_m
 from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.nominal import nominal_arrival_s
@@ -41,7 +41,7 @@ class Waits(Scripted):
 def test_a_hover_begins_at_its_offset_from_the_told_coordinate() -> None:
     scenario = hovering(8.0, told__error_m=3.0)
     flight = fly(scenario, Waits, STAND, map=EMPTY, time_limit_s=3.0)
-    assert start_m(scenario, EMPTY) == pytest.approx((5.0, -1.0, 8.0))
+    assert Placed(scenario, EMPTY).start_m == pytest.approx((5.0, -1.0, 8.0))
     away = np.linalg.norm(flight.uav.position_m - np.array([5.0, -1.0, 8.0]), axis=1)
     assert away.max() < 0.05
     assert not [event for event in flight.events if event.name == "took_off"]
@@ -69,12 +69,12 @@ def test_the_reference_pilot_arrives_when_a_nominal_flight_does() -> None:
     assert flight.outcome == "landed"
     above = np.linalg.norm(flight.uav.position_m[:, :2] - flight.marker_position_m, axis=1) < 0.3
     arrived_s = float(flight.uav.time_s[above][0])
-    assert nominal_arrival_s(scenario, EMPTY) == pytest.approx(arrived_s, abs=1.5)
+    assert nominal_arrival_s(Placed(scenario, EMPTY)) == pytest.approx(arrived_s, abs=1.5)
 
 
 def test_a_hover_in_a_tree_begins_beside_it() -> None:
     disc = max((d for body in LAWN.bodies for d in discs_of(body)), key=lambda d: d.high_m)
-    x, y, z = start_m(hovering(disc.high_m, x=disc.x_m, y=disc.y_m), LAWN)
+    x, y, z = Placed(hovering(disc.high_m, x=disc.x_m, y=disc.y_m), LAWN).start_m
     assert 0 < math.hypot(x - disc.x_m, y - disc.y_m) < 6
     assert z == disc.high_m
     flight = fly(hovering(disc.high_m, x=disc.x_m, y=disc.y_m), Waits, STAND, map=EMPTY)
@@ -85,4 +85,4 @@ def test_a_hover_in_a_tree_begins_beside_it() -> None:
 @pytest.mark.parametrize("height_m", [0.5, 500.0, math.nan])
 def test_a_height_at_which_no_flight_can_begin_is_refused(height_m: float) -> None:
     with pytest.raises(ScenarioError, match="expected 2 to 100 m"):
-        start_m(hovering(height_m), EMPTY)
+        hovering(height_m)

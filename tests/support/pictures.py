@@ -13,6 +13,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.renderer import Renderer
 
@@ -38,7 +39,7 @@ def renderer(
     scenario = decode(genome.nominal, genome, map=name, seed=seed)
     scenario = repair(scenario, map)
     scenario = scenario.replace({f"environment.{key}": value for key, value in genes.items()})
-    return Renderer(scenario, map, camera, np.random.default_rng(seed), colour=colour), map
+    return Renderer(Placed(scenario, map), camera, np.random.default_rng(seed), colour=colour), map
 
 
 def poses(x: float, y: float) -> list[tuple[tuple[float, float, float], float]]:

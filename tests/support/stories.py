@@ -12,7 +12,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import map_in, object_type, start_genes
+from pytest_garl.scenarios.placed import Placed, start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import with_all_values
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, NpcPolicy, Situation
@@ -39,7 +39,7 @@ def scenario_with(
     if height_m is not None:
         genes[f"{name}.height_m"] = height_m
     scenario = dataclasses.replace(scenario, genes=tuple(genes.items()))
-    share = object_type(scenario, EMPTY, name).share_of(speed_mps)
+    share = Placed(scenario, EMPTY).npc(name).type.share_of(speed_mps)
     scenario = scenario.replace({**start_genes(name, start_m, EMPTY), f"{name}.velocity": share})
     return scenario.without(*(each for each, _ in EMPTY.all_objects if each != name))
 
@@ -55,8 +55,8 @@ def walk(
     map: Map = EMPTY,
 ) -> np.ndarray:
     """Return the NPC's place (n, 3) at each tick of 1/60 s; it stays where it is between two."""
-    place = map_in(scenario, map)
-    npc = Npc(scenario, place, name, policy or policy_spec("graded").make())
+    placed = Placed(scenario, map)
+    npc = Npc(placed, name, policy or policy_spec("graded").make())
     places = []
     for tick in range(round(seconds / TICK_S)):
         now = tick * TICK_S
@@ -69,7 +69,7 @@ def walk(
                 uav_position_m=uav(now),
                 uav_velocity_mps=(0.0, 0.0, 0.0),
                 marker_position_m=(0.0, 0.0),
-                map=place,
+                map=placed.map,
                 scenario=scenario,
                 phases_s=known,
             )

@@ -19,7 +19,7 @@ from pytest_garl.landing_system import (
     Observation,
     PositionSetpoint,
 )
-from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.system_under_test.calls import crash_of
 
@@ -41,7 +41,7 @@ def fly(
     The system is called once, and further times if its answer is a position or a wish to give up.
     """
     del npcs, time_limit_s
-    marker = marker_position_m(scenario, map)
+    marker = Placed(scenario, map).marker_m
     outcome: Any = "landed"
     # A reference pilot, which gets the true positions, neither loses its way nor is hit.
     knows = getattr(system, "needs_camera", True) is False

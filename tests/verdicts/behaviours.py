@@ -24,7 +24,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import marker_position_m, start_genes
+from pytest_garl.scenarios.placed import Placed, start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.fly import fly
 
@@ -44,7 +44,7 @@ class Scene:
     @property
     def marker(self) -> Place:
         """The marker's place, which no landing system is told."""
-        return marker_position_m(self.scenario, self.map)
+        return Placed(self.scenario, self.map).marker_m
 
     def fly(self, route: Route, *, time_limit_s: float = 120.0) -> Flight:
         """Fly a route."""
@@ -68,7 +68,7 @@ def scene(
     scenario = scenario.replace(genes or {})
     names = [name for name, _ in map.all_objects]
     if person_on_marker:
-        place = marker_position_m(scenario, map)
+        place = Placed(scenario, map).marker_m
         scenario = scenario.replace(start_genes("person-1", place, map))
         names.remove("person-1")
     return Scene(map=map, scenario=scenario.without(*names))

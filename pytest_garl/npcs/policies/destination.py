@@ -6,7 +6,7 @@ import numpy as np
 
 from pytest_garl.errors import PolicyError
 from pytest_garl.npcs.steering import arrived, towards
-from pytest_garl.scenarios.placement import object_destination_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.npc_policy import Move, Situation
 
 
@@ -22,7 +22,7 @@ class Destination:
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Look the destination up; raise PolicyError if the scenario has none."""
         name = situation.self.name
-        goal = object_destination_m(situation.scenario, situation.map, name)
+        goal = Placed(situation.scenario, situation.map).npc(name).destination_m
         if goal is None:
             raise PolicyError(
                 f"NPC policy 'destination': the scenario has no gene '{name}.destination_x'; "

@@ -15,9 +15,8 @@ from pytest_garl.scenarios.bodies import discs_of
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import start_genes
+from pytest_garl.scenarios.placed import UAV_CLEARANCE_M, Placed, start_genes
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.start import UAV_CLEARANCE_M
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.loop import Loop
@@ -58,11 +57,12 @@ class Episode:
         time_limit_s: float = TIME_LIMIT_S,
     ) -> None:
         self.outcome: Outcome | None = None
-        self._loop = Loop(scenario, pilot, _MovedFromOutside, map, time_limit_s, None)
+        placed = Placed(scenario, map)
+        self._loop = Loop(placed, pilot, _MovedFromOutside, time_limit_s, None)
         self._loop.begin()
         self._names = [npc.name for npc in self._loop.npcs]
         self._renderer = (
-            Renderer(scenario, map, camera, generator(scenario.seed, "sensor"), colour=False)
+            Renderer(placed, camera, generator(scenario.seed, "sensor"), colour=False)
             if camera
             else None
         )

@@ -24,7 +24,7 @@ from pytest_garl.npcs.training.uav_models import (
 )
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES
-from pytest_garl.scenarios.placement import marker_position_m, object_start_m, start_genes
+from pytest_garl.scenarios.placed import Placed, start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, LIMITS_S, with_all_values
 from pytest_garl.scenarios.task import Start
@@ -139,8 +139,8 @@ def env_of(surrogate: Surrogate) -> GradedEnv | SurrogateEnv:
 
 def _near(scenario: Scenario, map: Map, name: str, grade: str) -> tuple[float, float]:
     """Return the start of an NPC, moved to where it soon perceives a UAV above the marker."""
-    x, y = object_start_m(scenario, map, name)
-    mx, my = marker_position_m(scenario, map)
+    placed = Placed(scenario, map)
+    (x, y), (mx, my) = placed.npc(name).start_m, placed.marker_m
     away = math.dist((x, y), (mx, my))
     share = min(1.0, (GRADE_LIMITS[grade].sees_within_m + BEYOND_SIGHT_M) / max(away, 1e-6))
     return mx + share * (x - mx), my + share * (y - my)

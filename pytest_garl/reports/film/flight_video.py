@@ -18,7 +18,7 @@ from pytest_garl.reports.film.map_pane import MapPane
 from pytest_garl.reports.film.pose import poses_at
 from pytest_garl.reports.film.timeline import Timeline
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import map_in, marker_position_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.environment import environment_at
@@ -62,10 +62,10 @@ def frames(
     all frames before the last seconds.  The end is the last moment with the outcome, for
     ``CLOSING_S``.  Raises GarlError where the flight is not one of this scenario.
     """
-    place = map_in(scenario, map)
-    check_scenario(flight, scenario, place)
-    renderer = renderer_of(scenario, place, camera)
-    left, right = CameraPane(renderer), MapPane(flight, scenario, place, camera)
+    placed = Placed(scenario, map)
+    check_scenario(flight, placed)
+    renderer = renderer_of(placed, camera)
+    left, right = CameraPane(renderer), MapPane(flight, placed, camera)
     below = Timeline(flight, signature)
     shown = scenario
     first_s = -math.inf if last_s is None else flight.elapsed_s - last_s
@@ -93,12 +93,9 @@ def rate_hz(flight: Flight, camera: Camera) -> float:
     return round((len(flight.steps) - 1) / span, 3)
 
 
-def check_scenario(flight: Flight, scenario: Scenario, map: Map) -> None:
-    """Raise GarlError where the flight is not one of this scenario.
-
-    ``map`` has the objects that are there in the scenario (``map_in``).
-    """
-    marker = marker_position_m(scenario, map)
+def check_scenario(flight: Flight, placed: Placed) -> None:
+    """Raise GarlError where the flight is not one of this scenario."""
+    marker, map = placed.marker_m, placed.map
     if math.dist(marker, flight.marker_position_m) > 1e-6:
         x, y = flight.marker_position_m
         raise GarlError(

@@ -15,10 +15,8 @@ from pytest_garl.reports.film import drawing
 from pytest_garl.reports.film.labels import Labels
 from pytest_garl.reports.film.pose import Poses, path_until
 from pytest_garl.scenarios.bodies import rotate
-from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import pad_of
-from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.ground import Raster, paint_ground
 from pytest_garl.simulation.camera.ground_cover import cover_shift
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
@@ -37,15 +35,15 @@ _WHITE_SHARE = 0.62
 class MapPane:
     """Draws the map of one flight; the parts that do not change are drawn once."""
 
-    def __init__(self, flight: Flight, scenario: Scenario, map: Map, camera: Camera) -> None:
-        self._flight, self._map, self._camera = flight, map, camera
-        x_min, x_max, y_min, y_max = map.bounds_m
+    def __init__(self, flight: Flight, placed: Placed, camera: Camera) -> None:
+        self._flight, self._map, self._camera = flight, placed.map, camera
+        x_min, x_max, y_min, y_max = self._map.bounds_m
         across, up = x_max - x_min + 2 * MARGIN_M, y_max - y_min + 2 * MARGIN_M
         self._scale = min(WIDTH / across, HEIGHT / up)
         self._left = WIDTH / 2 - (x_min + x_max) / 2 * self._scale
         self._bottom = HEIGHT / 2 + (y_min + y_max) / 2 * self._scale
-        self._marker = pad_of(scenario, map).main
-        self._background = self._ground(scenario)
+        self._marker = placed.pad.main
+        self._background = self._ground(placed)
         self._draw_background()
 
     def pixels(self, places_m: NDArray[Any]) -> NDArray[np.float64]:
@@ -83,11 +81,11 @@ class MapPane:
         x, y = self.pixels(np.array([place_m]))[0]
         return float(x), float(y)
 
-    def _ground(self, scenario: Scenario) -> drawing.Image:
+    def _ground(self, placed: Placed) -> drawing.Image:
         """Return the ground as it was painted for the flight, mixed with white."""
+        scenario = placed.scenario
         shift = cover_shift(generator(scenario.seed, "sensor"))
-        pad = pad_of(scenario, self._map)
-        wide = paint_ground(self._map, conditions_of(scenario), shift, pad).wide
+        wide = paint_ground(placed.map, conditions_of(scenario), shift, placed.pad).wide
         origin = self._left, self._bottom
         rgb = ground_from_above(wide, origin, self._scale, (WIDTH, HEIGHT))
         return np.asarray(

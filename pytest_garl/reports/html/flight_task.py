@@ -36,7 +36,7 @@ from pytest_garl.reports.html.scene import scene_data
 from pytest_garl.reports.html.sightings_text import sighting_sentences
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import map_in
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.verdicts.evidence import Evidence
@@ -227,9 +227,9 @@ def _drawn(
     try:
         # Without a camera the ground can still be painted.
         camera = dataclass_from(Camera, dict(task.camera), "camera") if task.camera else Camera()
-        place_flown = map_in(scenario, map)
-        renderer = renderer_of(scenario, place_flown, camera)
-        scene = scene_data(place_flown, renderer)
+        placed = Placed(scenario, map)
+        renderer = renderer_of(placed, camera)
+        scene = scene_data(placed.map, renderer)
         if task.camera is None:
             note = "The ledger does not name the camera: no pictures."
             return _Drawn(scene=scene, notes=(note,))

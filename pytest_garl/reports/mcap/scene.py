@@ -43,7 +43,7 @@ from pytest_garl.reports.mcap.values import (
 from pytest_garl.scenarios.bodies import Body, Part, quaternion_of, rotate
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import Pad, PlacedMarker, pad_of, turned_about
+from pytest_garl.scenarios.placed import Pad, Placed, PlacedMarker, turned_about
 from pytest_garl.simulation.camera.canvas import BLACK_LEVEL, WHITE_LEVEL
 from pytest_garl.simulation.camera.ground import paint_ground
 from pytest_garl.simulation.camera.ground_cover import cover_shift
@@ -68,7 +68,7 @@ def scene(flight: Flight, place: Place | None) -> Iterator[Logged]:
         entities.append(_marker_place(flight))
     else:
         entities += [_static(body) for body in place.map.bodies]
-        entities += _board(pad_of(place.scenario, place.map))
+        entities += _board(Placed(place.scenario, place.map).pad)
         entities.append(_bounds(place.map))
     entities += [_decoy(number, *decoy) for number, decoy in enumerate(flight.decoys, start=1)]
     yield Logged(time_ns=0, topic=SCENE, message=SceneUpdate(entities=entities))
@@ -81,7 +81,7 @@ def ground(place: Place) -> Iterator[Logged]:
     columns = math.ceil((x_max + MARGIN_M - left) / CELL_M)
     rows = math.ceil((y_max + MARGIN_M - low) / CELL_M)
     shift = cover_shift(generator(place.scenario.seed, "sensor"))
-    pad = pad_of(place.scenario, place.map)
+    pad = Placed(place.scenario, place.map).pad
     wide = paint_ground(place.map, conditions_of(place.scenario), shift, pad).wide
     origin_px = -left / CELL_M - 0.5, rows + low / CELL_M - 0.5
     picture = ground_from_above(wide, origin_px, 1 / CELL_M, (columns, rows))

@@ -20,6 +20,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.reports.film.drawing import Image
 from pytest_garl.reports.film.pose import Poses, poses_at
 from pytest_garl.reports.mcap.source import Place
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.exposure import Movement
@@ -67,7 +68,7 @@ class ShownPictures:
     def __iter__(self) -> Iterator[ShownPicture]:
         """Draw the pictures one after the other, in the order of time."""
         flight, scenario = self._flight, self._place.scenario
-        renderer = renderer_of(scenario, self._place.map, self.camera)
+        renderer = renderer_of(Placed(scenario, self._place.map), self.camera)
         outage, freezes = Event(scenario, "outage"), scenario["outage.frozen"] > 0
         last = black = np.zeros((self.camera.height_px, self.camera.width_px, 3), np.uint8)
         present = scenario

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.fiducial import DICTIONARIES
-from pytest_garl.scenarios.placement import MAP_DICTIONARY, Pad
+from pytest_garl.scenarios.placed import MAP_DICTIONARY, Pad
 
 Image = NDArray[np.uint8]
 Bounds = tuple[float, float, float, float]

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pytest_garl.landing_system import Camera
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import pad_of
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.exposure import STILL, Movement
 from pytest_garl.simulation.camera.frame import Frame
@@ -19,10 +18,11 @@ from pytest_garl.simulation.events import Event
 from pytest_garl.simulation.randomness import generator
 
 
-def renderer_of(scenario: Scenario, map: Map, camera: Camera, *, colour: bool = True) -> Renderer:
+def renderer_of(placed: Placed, camera: Camera, *, colour: bool = True) -> Renderer:
     """Return the renderer of a flight's frames, with what covers the marker for a while."""
+    scenario = placed.scenario
     made = Renderer if not _is_covered(scenario) else _Covering
-    return made(scenario, map, camera, generator(scenario.seed, "sensor"), colour=colour)
+    return made(placed, camera, generator(scenario.seed, "sensor"), colour=colour)
 
 
 def _is_covered(scenario: Scenario) -> bool:
@@ -34,20 +34,20 @@ class _Covering(Renderer):
 
     def __init__(
         self,
-        scenario: Scenario,
-        map: Map,
+        placed: Placed,
         camera: Camera,
         rng: np.random.Generator,
         *,
         colour: bool = True,
     ) -> None:
-        super().__init__(scenario, map, camera, rng, colour=colour)
+        super().__init__(placed, camera, rng, colour=colour)
+        scenario = placed.scenario
         self._event = Event(scenario, "cover")
         share = scenario["cover.share_percent"] / 100
-        pad = dataclasses.replace(pad_of(scenario, map), covered_share=share)
+        pad = dataclasses.replace(placed.pad, covered_share=share)
         # The same draws: nothing but the cover differs.
         again = generator(scenario.seed, "sensor")
-        self._with_cover = Renderer(scenario, map, camera, again, colour=colour, pad=pad)
+        self._with_cover = Renderer(placed, camera, again, colour=colour, pad=pad)
 
     def change(self, scenario: Scenario) -> None:
         """Show the environment of ``scenario`` from the next frame on."""

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.scenarios.placement import Decoy
+from pytest_garl.scenarios.placed import Decoy
 from pytest_garl.simulation.camera.canvas import BLACK_LEVEL, WHITE_LEVEL, Canvas, marker_bits
 
 _CELLS = 168

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import Pad
+from pytest_garl.scenarios.placed import Pad
 from pytest_garl.simulation.camera import map_texture
 from pytest_garl.simulation.camera.canvas import Bounds, Canvas, Image
 from pytest_garl.simulation.camera.decoys import paint_decoy

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from pytest_garl.errors import GarlError
 from pytest_garl.flight.flight import MarkerView
 from pytest_garl.landing_system import Camera
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import Pad, pad_of
+from pytest_garl.scenarios.placed import Pad, Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.exposure import STILL, Exposure, Movement, Optics
 from pytest_garl.simulation.camera.frame import Frame
@@ -84,19 +83,19 @@ class Renderer:
 
     def __init__(
         self,
-        scenario: Scenario,
-        map: Map,
+        placed: Placed,
         camera: Camera,
         rng: np.random.Generator,
         *,
         colour: bool = True,
         pad: Pad | None = None,
     ) -> None:
+        scenario, map = placed.scenario, placed.map
         self.camera, self._lens = camera, lens_of(camera)
         # What is drawn is what a pinhole sees; a lens bends it.
         self._drawn = drawn = self._lens.pinhole if self._lens else camera
         conditions = conditions_of(scenario)
-        self.pad, self._map = pad_of(scenario, map) if pad is None else pad, map
+        self.pad, self._map = placed.pad if pad is None else pad, map
         self._optics = Optics(scenario, camera)
         self.marker_m = self.pad.place_m
         names = ["ground", "marker", *(body.name for body in map.bodies)]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import Pad, PlacedMarker
+from pytest_garl.scenarios.placed import Pad, PlacedMarker
 from pytest_garl.simulation.camera.canvas import Canvas
 from pytest_garl.simulation.randomness import generator
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import marker_position_m, object_start_m, object_type
-from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.story import APPROACH_S, story_of
+from pytest_garl.scenarios.placed import PlacedNpc
+from pytest_garl.scenarios.story import APPROACH_S
 
 Plane = tuple[float, float]
 
@@ -27,16 +25,15 @@ class BirdPath:
     Without a story, and with that of a hostile bird, it is there from the start, at one height.
     """
 
-    def __init__(self, scenario: Scenario, map: Map, name: str, height_m: float) -> None:
-        self._story = story_of(scenario, name)
-        self._type = object_type(scenario, map, name)
+    def __init__(self, bird: PlacedNpc, marker_m: Plane) -> None:
+        self._story, self._type = bird.story, bird.type
         self.waits = self._story is not None and self._story.grade != "hostile"
-        self._height_m = height_m
+        self._height_m = height_m = bird.height_m
         self._began_s: float | None = None
         self._now_s = 0.0
         stoop_m = self._story.stoop_m if self._story and self.waits else 0.0
         self.lowest_m = max(min(height_m, LEAST_HEIGHT_M), height_m - stoop_m)
-        start, (mx, my) = object_start_m(scenario, map, name), marker_position_m(scenario, map)
+        start, (mx, my) = bird.start_m, marker_m
         dx, dy = self._story.crossing_m if self._story else (0.0, 0.0)
         self._crossing_m = (mx + dx, my + dy)
         away_rad = math.atan2(start[1] - my - dy, start[0] - mx - dx)

@@ -6,9 +6,8 @@ import math
 from collections import deque
 
 from pytest_garl.flight.thresholds import GRAVITY_MPS2
-from pytest_garl.scenarios.object_types import ObjectType
-from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.story import APPROACH_S, story_of
+from pytest_garl.scenarios.placed import PlacedNpc
+from pytest_garl.scenarios.story import APPROACH_S
 
 Vector = tuple[float, float, float]
 
@@ -26,8 +25,9 @@ class Leap:
     a body in the air, and comes down again after ``2 sqrt(2 h / g)``, 0.9 s for 1 m.
     """
 
-    def __init__(self, scenario: Scenario, kind: ObjectType, name: str) -> None:
-        self._story = story_of(scenario, name) if kind.leap_m > 0 else None
+    def __init__(self, dog: PlacedNpc) -> None:
+        kind = dog.type
+        self._story = dog.story if kind.leap_m > 0 else None
         self._type = kind
         self._seen: deque[tuple[float, Vector]] = deque()
         self._began_s: float | None = None

@@ -6,14 +6,7 @@ import math
 from collections.abc import Sequence
 
 from pytest_garl.scenarios.bodies import Body, Disc, discs_of
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import (
-    object_altitude_m,
-    object_speed_mps,
-    object_start_m,
-    object_type,
-)
-from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.npc_policy import (
     DECISION_STEP_S,
     Move,
@@ -43,15 +36,14 @@ both ways in that time."""
 class Npc:
     """One dynamic object of one flight."""
 
-    def __init__(self, scenario: Scenario, map: Map, name: str, policy: NpcPolicy) -> None:
-        self.name = name
-        self.type = object_type(scenario, map, name)
-        self.policy = policy
-        self.speed_mps = object_speed_mps(scenario, map, name)
-        self.x_m, self.y_m = object_start_m(scenario, map, name)
-        self.z_m = object_altitude_m(scenario, map, name)
+    def __init__(self, placed: Placed, name: str, policy: NpcPolicy) -> None:
+        own = placed.npc(name)
+        self.name, self.type, self.policy = name, own.type, policy
+        self.speed_mps = own.speed_mps
+        self.x_m, self.y_m = own.start_m
+        self.z_m = own.height_m
         self.flies = self.type.flies and self.speed_mps > 0
-        self._bounds = map.bounds_m
+        self._bounds = placed.map.bounds_m
         self.vx_mps = self.vy_mps = self.yaw_rad = 0.0
         if self.flies:
             self.yaw_rad = to_the_middle((self.x_m, self.y_m), self._bounds)
@@ -59,8 +51,8 @@ class Npc:
             self.vx_mps = least * math.cos(self.yaw_rad)
             self.vy_mps = least * math.sin(self.yaw_rad)
         self._reserve_m = self.type.burst_m
-        self._leap = Leap(scenario, self.type, name)
-        self.bird_path = BirdPath(scenario, map, name, self.z_m) if self.flies else None
+        self._leap = Leap(own)
+        self.bird_path = BirdPath(own, placed.marker_m) if self.flies else None
         if self.bird_path and self.bird_path.waits:
             self.x_m, self.y_m = self.bird_path.far_away_m
             self.vx_mps = self.vy_mps = 0.0
@@ -69,7 +61,7 @@ class Npc:
         self._wanted_velocity_mps = (0.0, 0.0)
         self.vz_mps = 0.0
         lowest_m = self.bird_path.lowest_m if self.bird_path else self.z_m
-        self._solids = _solids_at_height_of(self, lowest_m, map.bodies)
+        self._solids = _solids_at_height_of(self, lowest_m, placed.map.bodies)
         self._solids_in_reach: list[Disc] = []
 
     @property

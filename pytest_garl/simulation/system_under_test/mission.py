@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from pytest_garl.landing_system import Airframe, Mission
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import told_position_m
-from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.start import start_m
+from pytest_garl.scenarios.placed import Placed
 
 SEARCH_ALTITUDE_M = 10.0
 """Search height of the paper's published landing systems."""
 
 
 def mission_for(
-    scenario: Scenario,
-    map: Map,
+    placed: Placed,
     airframe: Airframe,
     time_limit_s: float,
     *,
@@ -24,11 +20,11 @@ def mission_for(
 
     Its home is where its own navigation, which errs by ``error_m``, says that it is.
     """
-    marker = scenario.task.marker
-    x, y, z = start_m(scenario, map)
+    marker = placed.scenario.task.marker
+    x, y, z = placed.start_m
     dx, dy, dz = error_m
     return Mission(
-        gps_position_m=told_position_m(scenario, map),
+        gps_position_m=placed.told_m,
         home_m=(x + dx, y + dy, z + dz),
         search_altitude_m=SEARCH_ALTITUDE_M,
         marker_id=marker.id,

@@ -20,7 +20,7 @@ from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.placed import Placed
 from tests.plugin.test_resume import FLOWN, SLOW, query
 from tests.support.landing_project import write_project
 
@@ -111,7 +111,7 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     # The analytic simulator's UAV starts 12 m above its landing place: two cells in each flight.
     cells = set()
     for flight in bad:
-        x, y = marker_position_m(parse_scenario(flight.scenario), map)
+        x, y = Placed(parse_scenario(flight.scenario), map).marker_m
         off = flight.result.final_distance_m
         # Places beyond the lawn are in no cell.
         if abs(x + off) < 10:

@@ -24,7 +24,7 @@ from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.fly import fly
@@ -86,7 +86,7 @@ def scenario(**genes: float) -> Scenario:
 
 
 def flown(where: Scenario, *, sees: bool = True, time_limit_s: float = 80) -> Flight:
-    system = type("Sees", (Lands,), {"marker": marker_position_m(where, EMPTY)}) if sees else Lands
+    system = type("Sees", (Lands,), {"marker": Placed(where, EMPTY).marker_m}) if sees else Lands
     policy = policy_spec("stationary")
     return fly(where, system, policy, map=EMPTY, time_limit_s=time_limit_s)
 

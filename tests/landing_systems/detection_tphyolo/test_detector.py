@@ -31,6 +31,7 @@ from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.task import Task
 from pytest_garl.simulation.camera.projection import View
 from pytest_garl.simulation.camera.renderer import Renderer
@@ -46,7 +47,7 @@ def renderer(number: int = 0, genes: Mapping[str, float] = NONE) -> Renderer:
     scenario = decode(genome.nominal, genome, map="lawn", seed=1)
     scenario = scenario.replace({f"environment.{name}": value for name, value in genes.items()})
     scenario = dataclasses.replace(scenario, task=Task(marker=MarkerSpec(id=number)))
-    return Renderer(scenario, map, CAMERA, np.random.default_rng(0))
+    return Renderer(Placed(scenario, map), CAMERA, np.random.default_rng(0))
 
 
 def observed(

@@ -7,7 +7,7 @@ from pytest_garl.errors import PolicyError
 from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
-from pytest_garl.scenarios.placement import object_destination_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
@@ -29,7 +29,7 @@ def test_npcs_walk_to_their_destination_and_back() -> None:
     }
     flight = fly(scenario.replace(ends), ReferencePilot, policy_spec("destination"), map=MAP)
     for item in flight.objects:
-        goal = object_destination_m(scenario.replace(ends), MAP, item.name)
+        goal = Placed(scenario.replace(ends), MAP).npc(item.name).destination_m
         assert goal is not None
         way = item.track.position_m[:, :2]
         from_goal = np.linalg.norm(way - np.array(goal), axis=1)

@@ -18,7 +18,7 @@ from pytest_garl.npcs.weights import WEIGHTS
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.placement import start_genes
+from pytest_garl.scenarios.placed import start_genes
 from pytest_garl.scenarios.story import GRADES, with_all_values
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.fly import fly

@@ -11,7 +11,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.reports.film import frames
 from pytest_garl.reports.film.drawing import MARKER
-from pytest_garl.scenarios.placement import marker_genes
+from pytest_garl.scenarios.placed import marker_genes
 from pytest_garl.simulation.fly import fly
 from tests.simulation.test_environment import WEATHERMAKER
 from tests.support.videos import CAMERA_PART, FLOWN_S, LAWN, SCENARIO, Hovers, Video, painted

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Camera, Detection, Diagnostics
 from pytest_garl.reports.mcap.source import Export, Place
-from pytest_garl.scenarios.placement import map_in, pad_of
+from pytest_garl.scenarios.placed import Placed
 from tests.reports.mcap.conftest import Exported
 from tests.support.flights import EMPTY, nominal
 from tests.support.mcap_files import (
@@ -49,7 +49,7 @@ COUNT = 40
 def over_the_marker(**genes: float) -> tuple[Flight, Place]:
     """Return a record of a UAV that passes over the marker, tilted and turning."""
     scenario = nominal(**{"pad.yaw_deg": 25.0, **genes})
-    x, y = pad_of(scenario, EMPTY).place_m
+    x, y = Placed(scenario, EMPTY).pad.place_m
     share = np.linspace(-1.0, 1.0, COUNT)
     places = np.stack([x + 1.5 * share, y - share, 5.0 + share], axis=1)
     flight = recorded(
@@ -62,7 +62,7 @@ def over_the_marker(**genes: float) -> tuple[Flight, Place]:
     attitude /= np.linalg.norm(attitude, axis=1, keepdims=True)
     uav = dataclasses.replace(flight.uav, attitude=attitude)
     flight = dataclasses.replace(flight, uav=uav, marker_position_m=(x, y))
-    return flight, Place(scenario=scenario, map=map_in(scenario, EMPTY), camera=None)
+    return flight, Place(scenario=scenario, map=Placed(scenario, EMPTY).map, camera=None)
 
 
 def export(flight: Flight, place: Place, folder: Path) -> Recording:
@@ -93,7 +93,7 @@ def test_the_outline_lies_on_the_marker(
     flight, place = over_the_marker(**genes)
     camera = MODELS[model]
     recording = export(flight, dataclasses.replace(place, camera=camera), tmp_path)
-    corners = np.array([(x, y, 0.0) for x, y in pad_of(place.scenario, EMPTY).main.outline_m])
+    corners = np.array([(x, y, 0.0) for x, y in Placed(place.scenario, EMPTY).pad.main.outline_m])
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50))
     read = 0
     assert len(recording.topics["/camera/image"]) == 16

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pytest_garl.reports.mcap.source import Place
 from pytest_garl.scenarios.bodies import Body, Part
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import map_in, pad_of
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls, rotation_matrix
 from tests.reports.mcap.conftest import Exported
 from tests.support.mcap_files import decoded, needs_extra
@@ -67,9 +67,9 @@ def test_a_turned_body_lies_where_the_camera_draws_it() -> None:
         rotation=(0.1, 0.2, 0.3, (1 - 0.14) ** 0.5),
     )
     body = Body(name="box", kind="box", parts=(part,), position_m=(3.0, -2.0, 0.0), yaw_rad=0.7)
-    map = dataclasses.replace(map_in(SCENARIO, LAWN), bodies=(body,))
+    map = dataclasses.replace(Placed(SCENARIO, LAWN).map, bodies=(body,))
     flight = dataclasses.replace(
-        recorded(steps=seen(())), marker_position_m=pad_of(SCENARIO, map).place_m
+        recorded(steps=seen(())), marker_position_m=Placed(SCENARIO, map).pad.place_m
     )
     (logged,) = scene(flight, Place(scenario=SCENARIO, map=map, camera=None))
     update = decoded(logged.message)
@@ -85,7 +85,7 @@ def test_a_turned_body_lies_where_the_camera_draws_it() -> None:
 
 def test_the_marker_is_drawn_module_by_module(exported: Exported) -> None:
     (triangles,) = entities(exported)["marker 0"].triangles
-    marker = pad_of(SCENARIO, LAWN).main
+    marker = Placed(SCENARIO, LAWN).pad.main
     points = np.array([(each.x, each.y) for each in triangles.points]).reshape(-1, 6, 2)
     white = np.array([each.r > 0.5 for each in triangles.colors]).reshape(-1, 6)[:, 0]
     assert len(points) == 9 * 9
@@ -111,7 +111,7 @@ def test_the_map_is_the_ground_from_above(exported: Exported) -> None:
         round((x_max - x_min + 4) / cell_m),
     )
     assert [each.name for each in grid.fields] == ["red", "green", "blue", "alpha"]
-    marker = pad_of(SCENARIO, LAWN).main
+    marker = Placed(SCENARIO, LAWN).pad.main
 
     def colours(dx: float, dy: float) -> NDArray[np.uint8]:
         """Return the cell at a place beside the marker's centre, whose yaw is nought."""

@@ -14,7 +14,7 @@ from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.reports.film.drawing import Image
 from pytest_garl.reports.mcap.shown_pictures import ShownPictures, taken_s
 from pytest_garl.reports.mcap.source import Place
-from pytest_garl.scenarios.placement import map_in
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.fly import fly
 from tests.support.videos import LAWN, SCENARIO, KeepsPictures
@@ -57,7 +57,7 @@ def flown(**genes: float) -> tuple[Flight, Scenario, list[Image]]:
 def again(flight: Flight, scenario: Scenario) -> ShownPictures:
     camera = Watches.airframe.camera
     return ShownPictures(
-        flight, Place(scenario=scenario, map=map_in(scenario, LAWN), camera=camera), camera
+        flight, Place(scenario=scenario, map=Placed(scenario, LAWN).map, camera=camera), camera
     )
 
 

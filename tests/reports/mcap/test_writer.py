@@ -12,7 +12,7 @@ import pytest
 
 from pytest_garl.errors import GarlError, SavingError
 from pytest_garl.reports.mcap.source import Export, Place
-from pytest_garl.scenarios.placement import map_in
+from pytest_garl.scenarios.placed import Placed
 from tests.reports.mcap.conftest import Exported
 from tests.support.mcap_files import needs_extra, read_mcap
 from tests.support.recorded_flights import hit_by_dog, recorded, seen
@@ -42,7 +42,7 @@ WITHOUT_PLACE = {
 
 
 def hovering(exported: Exported) -> Export:
-    place = Place(scenario=SCENARIO, map=map_in(SCENARIO, LAWN), camera=Hovers.airframe.camera)
+    place = Place(scenario=SCENARIO, map=Placed(SCENARIO, LAWN).map, camera=Hovers.airframe.camera)
     return Export(name="lawn-g00-s00", flight=exported.flight, place=place)
 
 

@@ -14,6 +14,7 @@ from pytest_garl.fiducial import DICTIONARIES
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.frame import Frame
@@ -27,7 +28,7 @@ CAMERA = Camera()
 def renderer(spec: MarkerSpec) -> Renderer:
     genome = genome_for(LAWN, task=Task(marker=spec))
     scenario = repair(decode(genome.nominal, genome, map="lawn", seed=1), LAWN)
-    return Renderer(scenario, LAWN, CAMERA, np.random.default_rng(0))
+    return Renderer(Placed(scenario, LAWN), CAMERA, np.random.default_rng(0))
 
 
 def look(made: Renderer, height: float, offset: tuple[float, float] = (0.0, 0.0)) -> Frame:

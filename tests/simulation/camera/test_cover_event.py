@@ -7,6 +7,7 @@ import pytest
 
 from pytest_garl import Camera
 from pytest_garl.flight.flight import MarkerView
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Renderer
@@ -18,7 +19,9 @@ LEVEL = (0.0, 0.0, 0.0, 1.0)
 
 def frame(share: float, time_s: float = 12.0, *, colour: bool = True, yaw: float = 0.0) -> Frame:
     event = {"cover__from_s": 10.0, "cover__lasts_s": 5.0, "cover__share_percent": share}
-    renderer = renderer_of(nominal(**event, pad__yaw_deg=yaw), EMPTY, Camera(), colour=colour)
+    renderer = renderer_of(
+        Placed(nominal(**event, pad__yaw_deg=yaw), EMPTY), Camera(), colour=colour
+    )
     x, y = renderer.marker_m
     return renderer.render((x, y, 4.0), LEVEL, time_s, [])
 
@@ -32,7 +35,7 @@ def view(share: float) -> MarkerView:
 @pytest.mark.parametrize("time_s", [9.99, 15.0])
 def test_nothing_lies_there_before_and_after(time_s: float) -> None:
     scenario = nominal()
-    plain = Renderer(scenario, EMPTY, Camera(), generator(scenario.seed, "sensor"))
+    plain = Renderer(Placed(scenario, EMPTY), Camera(), generator(scenario.seed, "sensor"))
     x, y = plain.marker_m
     expected = plain.render((x, y, 4.0), LEVEL, time_s, [])
     found = frame(50.0, time_s)

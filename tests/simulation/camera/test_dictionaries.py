@@ -9,6 +9,7 @@ import pytest
 
 from pytest_garl.fiducial import DICTIONARIES, MarkerSpec
 from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.task import Task
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.randomness import generator
@@ -22,7 +23,7 @@ def test_the_stock_detector_reads_every_dictionary_straight_above(name: str) -> 
     number = DICTIONARIES[name].size - 1
     task = Task(marker=MarkerSpec(dictionary=name, id=number))
     scenario = dataclasses.replace(nominal(), task=task)
-    renderer = Renderer(scenario, EMPTY, Camera(), generator(scenario.seed, "sensor"))
+    renderer = Renderer(Placed(scenario, EMPTY), Camera(), generator(scenario.seed, "sensor"))
     x, y = renderer.marker_m
     frame = renderer.render((x, y, HEIGHT_M), (0.0, 0.0, 0.0, 1.0), 0.0, [])
     family = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))

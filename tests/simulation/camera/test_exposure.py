@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pytest_garl import Camera
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.exposure import Movement, Optics
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.projection import View, eye_under
@@ -22,7 +23,7 @@ ROLLS = Movement(spin_radps=(1.0, 0.0, 0.0))
 
 def frame_of(movement: Movement, **values: float) -> Frame:
     scenario = nominal(**values)
-    renderer = Renderer(scenario, EMPTY, Camera(), generator(5, "sensor"))
+    renderer = Renderer(Placed(scenario, EMPTY), Camera(), generator(5, "sensor"))
     eye = eye_under((*renderer.marker_m[:2], 6.05), LEVEL)
     return renderer.render(eye, LEVEL, 0.0, [], movement)
 
@@ -72,7 +73,7 @@ def test_a_camera_at_rest_is_sharp() -> None:
 def test_noise_is_not_blurred() -> None:
     def noise(exposure_ms: float) -> float:
         scenario = nominal(camera__exposure_ms=exposure_ms, environment__sun_position=0.999)
-        renderer = Renderer(scenario, EMPTY, Camera(), generator(5, "sensor"))
+        renderer = Renderer(Placed(scenario, EMPTY), Camera(), generator(5, "sensor"))
         eye = eye_under((*renderer.marker_m[:2], 6.05), LEVEL)
         frames = [renderer.render(eye, LEVEL, at, [], ROLLS).image for at in (0.0, 0.1)]
         return float(np.std(np.subtract(*frames, dtype=float)))

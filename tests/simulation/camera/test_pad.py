@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pytest_garl import Camera
 from pytest_garl.flight.flight import MarkerView
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.simulation.camera.frame import Frame
@@ -24,7 +25,7 @@ LEVEL = (0.0, 0.0, 0.0, 1.0)
 
 
 def look(scenario: Scenario) -> tuple[Frame, MarkerView]:
-    renderer = Renderer(scenario, EMPTY, CAMERA, generator(scenario.seed, "sensor"))
+    renderer = Renderer(Placed(scenario, EMPTY), CAMERA, generator(scenario.seed, "sensor"))
     x, y = renderer.marker_m
     frame = renderer.render((x, y, HEIGHT_M), LEVEL, 0.0, [])
     assert frame.marker is not None

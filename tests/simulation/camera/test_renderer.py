@@ -11,7 +11,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.groups import WEATHER
 from pytest_garl.scenarios.maps.loading import map_names
-from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.frame import Frame
@@ -82,7 +82,7 @@ def test_marker_position_is_where_the_genes_say() -> None:
     made, map = renderer("court")
     genome = genome_for(map, weather="full")
     scenario = repair(decode(genome.nominal, genome, map="court", seed=0), map)
-    assert made.marker_m == marker_position_m(scenario, map)
+    assert made.marker_m == Placed(scenario, map).marker_m
 
 
 def test_another_marker_is_drawn_where_asked() -> None:
@@ -90,7 +90,7 @@ def test_another_marker_is_drawn_where_asked() -> None:
     genome = genome_for(map, weather="full")
     scenario = repair(decode(genome.nominal, genome, map="lawn", seed=0), map)
     scenario = dataclasses.replace(scenario, task=Task(marker=MarkerSpec(id=7)))
-    other = Renderer(scenario, map, CAMERA, np.random.default_rng(0))
+    other = Renderer(Placed(scenario, map), CAMERA, np.random.default_rng(0))
     x, y = other.marker_m
     image = other.render((x, y, 3.0), LEVEL, 0.0, [((50.0, 50.0, 0.0), 0.0)] * 3).image
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pytest_garl import Camera
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.camera.true_camera import Mounting, true_camera
@@ -20,7 +21,7 @@ LEVEL = (0.0, 0.0, 0.0, 1.0)
 def centre_of_marker(**values: float) -> tuple[np.ndarray, Renderer]:
     scenario = nominal(**values)
     camera = true_camera(Camera(), scenario)
-    renderer = Renderer(scenario, EMPTY, camera, generator(5, "sensor"), colour=False)
+    renderer = Renderer(Placed(scenario, EMPTY), camera, generator(5, "sensor"), colour=False)
     place = (*renderer.marker_m[:2], 10.0)
     eye = eye_under(place, LEVEL)
     frame = renderer.render(eye, Mounting(scenario).attitude(LEVEL), 0.0, [])

@@ -15,7 +15,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import object_altitude_m, start_genes
+from pytest_garl.scenarios.placed import Placed, start_genes
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Move, Situation
 from pytest_garl.simulation.physics.npc import Npc
 
@@ -37,7 +37,7 @@ def npc_that(
     genome = genome_for(map)
     scenario = decode(genome.nominal, genome, map="lawn", seed=1)
     scenario = scenario.replace({**start_genes(name, start, map), f"{name}.velocity": velocity})
-    npc = Npc(scenario, map, name, recorded_spec({name: moves}).make())
+    npc = Npc(Placed(scenario, map), name, recorded_spec({name: moves}).make())
     situation = Situation(
         time_s=0.0,
         self=npc.state,
@@ -162,8 +162,8 @@ def test_bird_flies_at_the_height_that_the_scenario_gives() -> None:
     assert npc.position_m[2] == 3.0
     genes = (*situation.scenario.genes, ("bird-1.height_m", 6.5))
     scenario = dataclasses.replace(situation.scenario, genes=genes)
-    assert object_altitude_m(scenario, EMPTY, "bird-1") == 6.5
-    higher = Npc(scenario, EMPTY, "bird-1", npc.policy)
+    assert Placed(scenario, EMPTY).npc("bird-1").height_m == 6.5
+    higher = Npc(Placed(scenario, EMPTY), "bird-1", npc.policy)
     assert (higher.low_m, higher.high_m) == pytest.approx((6.4, 6.6))
     assert (higher.state.bottom_m, higher.state.top_m) == pytest.approx((6.4, 6.6))
 
