@@ -483,7 +483,7 @@ def _last_place(flight: Flight) -> str:
 
 def _place(flight: Flight, time_s: float) -> str:
     """Return such as ``at 14.0 s, in the phase descent, 4.6 m up and 0.3 m from the marker``."""
-    index = max(0, int(flight.uav.time_s.searchsorted(time_s, side="right")) - 1)
+    index = flight.uav.index_at(time_s)
     x, y, z = (float(value) for value in flight.uav.position_m[index])
     beside_m = math.dist((x, y), flight.marker_position_m)
     phase = Evidence(flight).phase_at(time_s)

@@ -75,7 +75,7 @@ class EscapeModel:
     def __init__(self, chase: Chase, from_s: float) -> None:
         self._chase, self.from_s = chase, from_s
         track = chase.flight.uav
-        self._index = max(0, int(np.searchsorted(track.time_s, from_s + 1e-6, side="right")) - 1)
+        self._index = track.index_at(from_s + 1e-6)
         self._model = vehicle_model(chase.airframe)
         self._wind = mean_wind(chase.scenario, chase.map.ground.texture)
         self._phases, self._known_samples = LandingPhases(), 0

@@ -82,7 +82,7 @@ def encounter_of(flight: Flight, map: Map) -> Encounter | None:
     hit = next((item for item in flight.objects if item.name == contact.body), None)
     if hit is None or hit.type not in OBJECT_TYPES or not len(hit.track.time_s):
         return None
-    index = max(0, int(hit.track.time_s.searchsorted(contact.time_s, side="right")) - 1)
+    index = hit.track.index_at(contact.time_s)
     x, y, z = (float(value) for value in hit.track.position_m[index])
     vx, vy = (float(value) for value in hit.track.velocity_mps[index, :2])
     ux, uy, uz = (float(value) for value in flight.uav.position_m[index])

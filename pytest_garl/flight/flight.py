@@ -36,6 +36,10 @@ class Track:
     attitude: NDArray[np.float64]
     velocity_mps: NDArray[np.float64]
 
+    def index_at(self, time_s: float) -> int:
+        """Return the last sample that is not later than a time; the first one before all."""
+        return max(0, int(self.time_s.searchsorted(time_s, side="right")) - 1)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ObjectRecord:

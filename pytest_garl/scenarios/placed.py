@@ -281,6 +281,11 @@ class Placed:
         )
 
     @cached_property
+    def layers(self) -> tuple[Layer, ...]:
+        """What is painted on the ground, and the decoys that lie there."""
+        return (*self._map.ground.layers, *(each.layer for each in self.decoys))
+
+    @cached_property
     def told_m(self) -> Place:
         """The coordinate (x, y) that the mission gives for the marker."""
         surveyed = self.scenario["told.surveyed"] >= 0.5

@@ -231,9 +231,8 @@ class Loop:
     def _under(self, place: tuple[float, float]) -> str:
         """Return what lies under the UAV if it touches down at a place at this moment."""
         bodies = (*self.map.bodies, *(npc.body for npc in self.npcs))
-        pad = self._placed.pad
-        layers = (*self.map.ground.layers, *(each.layer for each in pad.decoys))
-        return what_lies_under(place, pad.main, layers, bodies, self.scenario)
+        placed = self._placed
+        return what_lies_under(place, placed.pad.main, placed.layers, bodies, self.scenario)
 
     def _truth(self, error_m: Vector) -> Truth:
         """Return the truth in the frame of the estimated position, in which the pilot flies."""

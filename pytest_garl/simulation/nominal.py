@@ -169,7 +169,7 @@ def _across_s(start: Place, goal: Place) -> float:
 def _pose(item: ObjectRecord, time_s: float) -> BodyPose:
     """Return where an object was, at the last sample that is not later than a time."""
     track = item.track
-    index = max(0, int(track.time_s.searchsorted(time_s, side="right")) - 1)
+    index = track.index_at(time_s)
     x, y, z = (float(value) for value in track.position_m[index])
     _, _, turn_z, turn_w = (float(value) for value in track.attitude[index])
     return (x, y, z), 2 * math.atan2(turn_z, turn_w)

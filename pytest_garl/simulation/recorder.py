@@ -50,13 +50,12 @@ class Recorder:
 
     def __init__(self, placed: Placed, objects: Sequence[Npc]) -> None:
         self.time_s = 0.0
-        self._objects, self._marker, map = objects, placed.marker_m, placed.map
-        layers = (*map.ground.layers, *(each.layer for each in placed.decoys))
+        self._objects, self._marker = objects, placed.marker_m
         self._decoys = tuple(
-            (each.name, *each.points_m[0]) for each in layers if each.kind == "marker"
+            (each.name, *each.points_m[0]) for each in placed.layers if each.kind == "marker"
         )
         self._kinds: dict[str, tuple[str, BodyClass]] = {"ground": ("ground", "ground")}
-        self._kinds |= {body.name: (body.kind, "static") for body in map.bodies}
+        self._kinds |= {body.name: (body.kind, "static") for body in placed.map.bodies}
         self._kinds |= {item.name: (item.type.name, "dynamic") for item in objects}
         self._times: list[float] = []
         self._uav: list[tuple[float, ...]] = []

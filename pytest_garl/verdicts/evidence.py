@@ -191,7 +191,7 @@ class Evidence:
     def phase_at(self, time_s: float) -> str:
         """Return the phase: take-off, transit, search, approach, descent, last-metre, standing."""
         flight = self.flight
-        index = max(0, int(np.searchsorted(flight.uav.time_s, time_s, side="right")) - 1)
+        index = flight.uav.index_at(time_s)
         x, y, z = (float(value) for value in flight.uav.position_m[index])
         if index < self.flying_from:
             return "take-off"

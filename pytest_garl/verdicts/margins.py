@@ -174,12 +174,12 @@ def _decoy_m(evidence: Evidence) -> float:
 
 def _tracking_error_m(evidence: Evidence, low: NDArray[np.bool_]) -> float:
     """Return the largest distance from the reported target below the commit height."""
-    times, places = evidence.flight.uav.time_s, evidence.flight.uav.position_m
+    track = evidence.flight.uav
     errors = []
     for time_s, target in evidence.targets:
-        index = max(0, int(np.searchsorted(times, time_s, side="right")) - 1)
+        index = track.index_at(time_s)
         if low[index]:
-            errors.append(math.dist(target, tuple(places[index, :2])))
+            errors.append(math.dist(target, tuple(track.position_m[index, :2])))
     return max(errors, default=0.0)
 
 

@@ -137,7 +137,7 @@ def off_in_track(flight: Flight, limit_m: float) -> Touchdown | None:
     if first is None:
         return None
     track = flight.uav
-    start = max(0, int(np.searchsorted(track.time_s, first.time_s, side="right")) - 1)
+    start = track.index_at(first.time_s)
     # The sample before a contact lies above the ground, the one after it on the ground.
     height = float(track.position_m[start : start + 2, 2].min()) + ON_GROUND_M
     mx, my = flight.marker_position_m

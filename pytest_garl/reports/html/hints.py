@@ -165,7 +165,7 @@ def _elsewhere(evidence: Evidence | None) -> str:
         )
     flight, down = evidence.flight, evidence.decided_s
     off_m = math.dist(target, flight.marker_position_m)
-    index = max(0, int(np.searchsorted(flight.uav.time_s, down, side="right")) - 1)
+    index = flight.uav.index_at(down)
     x, y = (float(value) for value in flight.uav.position_m[index, :2])
     missed_m = math.dist(target, (x, y))
     if off_m > missed_m:
