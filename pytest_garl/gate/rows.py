@@ -126,10 +126,9 @@ class RowReader:
                 f"found {no_landing or 'no reason'!r} why the outcome {outcome} did not land, "
                 f"expected {expected}",
             )
-        if bool(landing) is not (outcome == "landed"):
-            expected = "[distance, time]" if outcome == "landed" else "[]"
+        if outcome == "landed" and not landing:
             raise self.table.error(
-                key, f"found {shown(landing)} beside the outcome {outcome}, expected {expected}"
+                key, "found [] beside the outcome landed, expected [distance, time]"
             )
         distance_m, time_s = self._landing(key, landing)
         genes = self._listed(key, values)
