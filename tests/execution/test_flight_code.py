@@ -51,11 +51,11 @@ def test_what_flies_and_judges_no_case_does_not_matter(copy: Path) -> None:
     for file in (
         "__init__.py",
         "messages.py",
-        "adversary/learned.py",
+        "npcs/learned.py",
         "execution/severity.py",
         "execution/worker.py",
         "plugin/summary.py",
-        "regressions/shrink.py",
+        "cases/shrink.py",
         "scenarios/domains/field.toml",
         "search/breeder.py",
     ):
@@ -75,7 +75,7 @@ def test_what_flies_or_judges_a_case_matters(copy: Path, file: str) -> None:
 def test_physics_camera_recorded_moves_and_verdicts_fly_and_judge() -> None:
     assert {
         "pytest_garl.npcs.recorded",
-        "pytest_garl.scenarios.validity",
+        "pytest_garl.scenarios.placed",
         "pytest_garl.simulation.camera.renderer",
         "pytest_garl.simulation.physics.wind",
         "pytest_garl.verdicts.excuses",
