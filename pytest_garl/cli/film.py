@@ -63,8 +63,7 @@ def draw(found: NamedFlight, path: Path, last_s: float | None = None) -> None:
     save_video(
         path,
         found.flight,
-        place.scenario,
-        place.map,
+        place.placed,
         place.camera,
         found.signature,
         last_s=last_s,

@@ -154,8 +154,7 @@ class FlightName:
                 else load_scenario(self.scenario, _MAPS)
             )
             place = Place(
-                scenario=scenario,
-                map=Placed(scenario, load_map(scenario.map, _MAPS)).map,
+                placed=Placed(scenario, load_map(scenario.map, _MAPS)),
                 camera=airframe_of(imported_system(self.system)).camera,
             )
         elif self.scenario is not None or self.system is not None:
@@ -240,8 +239,7 @@ def flown_again(
         signature=replayed.signature,
         limits=case.limits,
         place=Place(
-            scenario=case.scenario,
-            map=Placed(case.scenario, replayed.map).map,
+            placed=Placed(case.scenario, replayed.map),
             camera=airframe_of(system_of(case, root)).camera,
         ),
         how=f"flown again{other}",
@@ -271,7 +269,7 @@ def _recorded(task: FlightTask, flight: Flight) -> NamedFlight:
     except GarlError as error:
         unseen = str(error)
     scenario = parse_scenario(task.scenario)
-    place = Place(scenario=scenario, map=Placed(scenario, map).map, camera=camera)
+    place = Place(placed=Placed(scenario, map), camera=camera)
     return replace(found, place=place, no_pictures=unseen, notes=notes)
 
 

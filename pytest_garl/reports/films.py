@@ -19,6 +19,7 @@ from pytest_garl.reports.film import save_video
 from pytest_garl.reports.html.flight_task import FlightTask, record_of, task_of
 from pytest_garl.reports.html.page_workers import in_processes
 from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.scenarios.placed import Placed
 
 NO_RECORD = "its process ended before its record was written"
 
@@ -89,7 +90,7 @@ def draw_film(task: FilmTask) -> None:
     if record is None:
         raise GarlError(missing or NO_RECORD)
     scenario, map = parse_scenario(flight.scenario), flight.job.load_map()
-    save_video(task.file, record, scenario, map, camera, flight.result.signature)
+    save_video(task.file, record, Placed(scenario, map), camera, flight.result.signature)
 
 
 def draw_films(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from pytest_garl.errors import ScenarioError
@@ -180,22 +180,23 @@ def place_genes(place: str, position_m: tuple[float, float], map: Map) -> dict[s
     }
 
 
+@dataclass(frozen=True)
 class PlacedNpc:
     """One NPC of a scenario: its type, its story, and its genes in metres."""
 
-    def __init__(self, scenario: Scenario, map: Map, name: str) -> None:
-        self.name = name
-        self._scenario, self._map = scenario, map
+    scenario: Scenario
+    map: Map
+    name: str
 
     @cached_property
     def type(self) -> ObjectType:
         """Its type in the scenario, where a person may be a child."""
-        return OBJECT_TYPES[dict(self._map.present_objects)[self.name]]
+        return OBJECT_TYPES[dict(self.map.present_objects)[self.name]]
 
     @cached_property
     def story(self) -> Story | None:
         """Its story, None if the scenario has none for it."""
-        return story_of(self._scenario, self.name)
+        return story_of(self.scenario, self.name)
 
     @cached_property
     def start_m(self) -> Place:
@@ -206,47 +207,50 @@ class PlacedNpc:
     def destination_m(self) -> Place | None:
         """Its destination, None if the genome has no destinations."""
         key = f"{self.name}.destination_x"
-        bound = any(each == key for each, _ in self._scenario.genes)
+        bound = any(each == key for each, _ in self.scenario.genes)
         return self._over_bounds("destination") if bound else None
 
     @cached_property
     def speed_mps(self) -> float:
         """Its largest speed: what its velocity gene means for its type."""
-        return self.type.speed_mps(self._scenario[f"{self.name}.velocity"])
+        return self.type.speed_mps(self.scenario[f"{self.name}.velocity"])
 
     @cached_property
     def height_m(self) -> float:
         """The height of its frame above the ground; what never moves sits there."""
         if not self.type.flies or self.speed_mps == 0:
             return self.type.sitting_m
-        return self._scenario.get(f"{self.name}.height_m", self.type.altitude_m)
+        return self.scenario.get(f"{self.name}.height_m", self.type.altitude_m)
 
     def _over_bounds(self, end: str) -> Place:
-        x_min, x_max, y_min, y_max = self._map.bounds_m
-        x, y = (self._scenario[f"{self.name}.{end}_{axis}"] for axis in "xy")
+        x_min, x_max, y_min, y_max = self.map.bounds_m
+        x, y = (self.scenario[f"{self.name}.{end}_{axis}"] for axis in "xy")
         return x_min + (x + 1) / 2 * (x_max - x_min), y_min + (y + 1) / 2 * (y_max - y_min)
 
 
+@dataclass(frozen=True)
 class Placed:
-    """The places of a scenario on a map, each computed once, when somebody asks for it first."""
+    """The places of a scenario, each computed once, when somebody asks for it first.
 
-    def __init__(self, scenario: Scenario, map: Map) -> None:
-        self.scenario = scenario
-        self._map = map
-        self._npcs: dict[str, PlacedNpc] = {}
+    ``whole_map`` is its map, with or without the objects that the scenario removes.
+    """
+
+    scenario: Scenario
+    whole_map: Map
+    _npcs: dict[str, PlacedNpc] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
     def map(self) -> Map:
         """The map with the objects that are there in the scenario."""
-        names = (name for name, _ in self._map.all_objects)
-        place = self._map.without(self.scenario.removed_objects)
+        names = (name for name, _ in self.whole_map.all_objects)
+        place = self.whole_map.without(self.scenario.removed_objects)
         return dataclasses.replace(place, children=children_in(self.scenario, names))
 
     @cached_property
     def marker_m(self) -> Place:
         """The centre of the marker in the world."""
         u, v = square_to_disc(self.scenario["marker.x"], self.scenario["marker.y"])
-        gps_x, gps_y = self._map.gps_position_m
+        gps_x, gps_y = self.whole_map.gps_position_m
         return gps_x + MARKER_RADIUS_M * u, gps_y + MARKER_RADIUS_M * v
 
     @cached_property
@@ -269,7 +273,7 @@ class Placed:
 
     def _decoy(self, name: str, kind: str) -> Decoy:
         scenario, spec = self.scenario, self.scenario.task.marker
-        east, north = self._map.gps_position_m
+        east, north = self.whole_map.gps_position_m
         return Decoy(
             name=name,
             kind=kind,
@@ -283,13 +287,13 @@ class Placed:
     @cached_property
     def layers(self) -> tuple[Layer, ...]:
         """What is painted on the ground, and the decoys that lie there."""
-        return (*self._map.ground.layers, *(each.layer for each in self.decoys))
+        return (*self.whole_map.ground.layers, *(each.layer for each in self.decoys))
 
     @cached_property
     def told_m(self) -> Place:
         """The coordinate (x, y) that the mission gives for the marker."""
         surveyed = self.scenario["told.surveyed"] >= 0.5
-        x, y = self.marker_m if surveyed else self._map.gps_position_m
+        x, y = self.marker_m if surveyed else self.whole_map.gps_position_m
         towards = math.radians(self.scenario["told.towards_deg"])
         error_m = self.scenario["told.error_m"]
         return x + error_m * math.cos(towards), y + error_m * math.sin(towards)
@@ -303,14 +307,14 @@ class Placed:
         """
         start = self.scenario.task.start
         if not start.hovers:
-            return self._map.uav_start_m
+            return self.whole_map.uav_start_m
         x, y = self.told_m
         for place in _places_around((x + start.offset_m[0], y + start.offset_m[1])):
-            if _is_clear((*place, start.height_m), self._map):
+            if _is_clear((*place, start.height_m), self.whole_map):
                 return *place, start.height_m
         raise ScenarioError(
             f"start offset_m = {start.offset_m!r}: no place within {_FARTHEST_M:g} m of it is "
-            f"clear of the bodies of the map {self._map.name!r} at a height of {start.height_m:g} m"
+            f"clear of the bodies of the map {self.map.name!r} at a height of {start.height_m:g} m"
         )
 
     def npc(self, name: str) -> PlacedNpc:

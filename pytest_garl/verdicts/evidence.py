@@ -61,11 +61,12 @@ class Report:
         return self.detects and not self.marker
 
 
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """The facts of one flight; ``limits`` say which touchdowns are off the marker."""
 
-    def __init__(self, flight: Flight, limits: Limits = DEFAULT_LIMITS) -> None:
-        self.flight, self.limits = flight, limits
+    flight: Flight
+    limits: Limits = DEFAULT_LIMITS
 
     @cached_property
     def hit(self) -> Contact | None:

@@ -22,9 +22,7 @@ from pytest_garl.execution.reference import Reference
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import save
 from pytest_garl.plugin import case_tests
-from pytest_garl.reports.mcap.source import Place
 from pytest_garl.scenarios.files import dumps
-from pytest_garl.scenarios.placed import Placed
 from tests.cases.samples import LAWN
 from tests.cases.samples import case as dog_case
 from tests.reports.html.test_report import lost
@@ -215,7 +213,9 @@ def test_a_case_has_the_camera_of_its_system(case: Path, before: str) -> None:
     assert found.signature == "IV:dog:last-metre:unseen"
     scenario = dog_case().scenario
     camera = Hovers.airframe.camera
-    assert found.place == Place(scenario=scenario, map=Placed(scenario, LAWN).map, camera=camera)
+    assert found.place is not None
+    assert (found.place.placed.scenario, found.place.camera) == (scenario, camera)
+    assert found.place.placed.map == LAWN.without(scenario.removed_objects)
     assert find(f"{before}{case.stem}-live").name == f"{dog_case().id}-live"
 
 

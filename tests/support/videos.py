@@ -17,6 +17,7 @@ from pytest_garl.reports.film import frames
 from pytest_garl.reports.film.drawing import Image
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 
@@ -84,7 +85,7 @@ class Video:
 @pytest.fixture(scope="package")
 def video() -> Video:
     flight = fly(SCENARIO, Hovers, policy_spec("waypoint"), time_limit_s=FLOWN_S)
-    pictures = frames(flight, SCENARIO, LAWN, Hovers.airframe.camera, "II:lost:descent")
+    pictures = frames(flight, Placed(SCENARIO, LAWN), Hovers.airframe.camera, "II:lost:descent")
     return Video(flight=flight, seen=list(Hovers.seen), pictures=list(pictures))
 
 

@@ -17,9 +17,7 @@ from pytest_garl.reports.film.film_file import write_film
 from pytest_garl.reports.film.map_pane import MapPane
 from pytest_garl.reports.film.pose import poses_at
 from pytest_garl.reports.film.timeline import Timeline
-from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placed import Placed
-from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.environment import environment_at
 
@@ -30,8 +28,7 @@ CLOSING_S = 2.0
 def save_video(
     path: Path,
     flight: Flight,
-    scenario: Scenario,
-    map: Map,
+    placed: Placed,
     camera: Camera,
     signature: str = "",
     *,
@@ -42,14 +39,13 @@ def save_video(
     A file .mp4 has the full size, a file .gif half of it.  ``last_s`` shows the last seconds only.
     Raises GarlError where the flight is not one of this scenario, or there is no encoder.
     """
-    pictures = frames(flight, scenario, map, camera, signature, last_s=last_s)
+    pictures = frames(flight, placed, camera, signature, last_s=last_s)
     write_film(pictures, path, rate_hz(flight, camera))
 
 
 def frames(
     flight: Flight,
-    scenario: Scenario,
-    map: Map,
+    placed: Placed,
     camera: Camera,
     signature: str = "",
     *,
@@ -57,12 +53,12 @@ def frames(
 ) -> Iterator[Image]:
     """Yield the video's pictures, RGB uint8 (656, 1024, 3): one per camera frame, then the end.
 
-    ``map`` is the scenario's, with or without its removed objects; ``camera`` the one that
-    flew; ``signature`` the verdict's, empty for a flight without violation.  ``last_s`` leaves out
-    all frames before the last seconds.  The end is the last moment with the outcome, for
-    ``CLOSING_S``.  Raises GarlError where the flight is not one of this scenario.
+    ``camera`` is the one that flew; ``signature`` the verdict's, empty for a flight without
+    violation.  ``last_s`` leaves out all frames before the last seconds.  The end is the last
+    moment with the outcome, for ``CLOSING_S``.  Raises GarlError where the flight is not one of
+    this scenario.
     """
-    placed = Placed(scenario, map)
+    scenario = placed.scenario
     check_scenario(flight, placed)
     renderer = renderer_of(placed, camera)
     left, right = CameraPane(renderer), MapPane(flight, placed, camera)

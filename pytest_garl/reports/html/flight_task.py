@@ -35,9 +35,7 @@ from pytest_garl.reports.html.pictures import Still, film_of, film_uri, stills_o
 from pytest_garl.reports.html.scene import scene_data
 from pytest_garl.reports.html.sightings_text import sighting_sentences
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placed import Placed
-from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.verdicts.evidence import Evidence
 
@@ -119,7 +117,7 @@ def shown_flight(task: FlightTask) -> ShownFlight:
     """Return what a page shows of a flight; what cannot be shown is named in the notes."""
     verdict, crash = task.result.verdict, task.result.crash
     severity = task.result.severity or NO_SEVERITY
-    conditions, place, notes = _conditions(task)
+    conditions, placed, notes = _conditions(task)
     traceback = cut_text(crash.traceback or crash.message) if crash else ""
     flight, missing = record_of(task)
     if flight is None:
@@ -135,7 +133,7 @@ def shown_flight(task: FlightTask) -> ShownFlight:
     evidence = Evidence(flight, task.job.limits)
     moments = moments_of(evidence)
     data = flight_data(evidence, moments)
-    drawn = _drawn(task, evidence, place, moments) if place else _Drawn()
+    drawn = _drawn(task, evidence, placed, moments) if placed else _Drawn()
     return ShownFlight(
         description=describe(flight, verdict, severity),
         data=data | {"scene": drawn.scene, "film_start_s": _film_start_s(flight)},
@@ -161,7 +159,6 @@ _NO_RECORD = (
     "The process that flew this flight ended before its record was written, so there is neither a "
     "path nor a picture."
 )
-Place = tuple[Scenario, Map]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,11 +172,11 @@ class _Drawn:
     notes: tuple[str, ...] = ()
 
 
-def _conditions(task: FlightTask) -> tuple[tuple[ConditionRow, ...], Place | None, list[str]]:
+def _conditions(task: FlightTask) -> tuple[tuple[ConditionRow, ...], Placed | None, list[str]]:
     """Return the scenario in words and where it is flown, None if its map cannot be read."""
     try:
         map, scenario = task.job.load_map(), parse_scenario(task.scenario)
-        return condition_rows(scenario, map, task.policy), (scenario, map), []
+        return condition_rows(scenario, map, task.policy), Placed(scenario, map), []
     except GarlError as error:
         return (), None, [f"The scenario cannot be shown: {cut_text(str(error), 400)}"]
 
@@ -213,10 +210,9 @@ def _film_start_s(flight: Flight) -> float:
 
 
 def _drawn(
-    task: FlightTask, evidence: Evidence, place: Place, moments: tuple[Moment, ...]
+    task: FlightTask, evidence: Evidence, placed: Placed, moments: tuple[Moment, ...]
 ) -> _Drawn:
     """Return the pictures of a flight in the built-in simulator."""
-    scenario, map = place
     if task.job.simulator != BUILT_IN:
         return _Drawn(
             notes=(
@@ -227,24 +223,23 @@ def _drawn(
     try:
         # Without a camera the ground can still be painted.
         camera = dataclass_from(Camera, dict(task.camera), "camera") if task.camera else Camera()
-        placed = Placed(scenario, map)
         renderer = renderer_of(placed, camera)
         scene = scene_data(placed.map, renderer)
         if task.camera is None:
             note = "The ledger does not name the camera: no pictures."
             return _Drawn(scene=scene, notes=(note,))
-        stills, thumbnail = stills_of(evidence, scenario, renderer, moments)
+        stills, thumbnail = stills_of(evidence, placed.scenario, renderer, moments)
     except (GarlError, ValueError) as error:
         return _Drawn(notes=(f"No pictures: {cut_text(str(error), 400)}",))
-    film, notes = _film(task, evidence.flight, place, camera) if task.with_film else ("", ())
+    film, notes = _film(task, evidence.flight, placed, camera) if task.with_film else ("", ())
     return _Drawn(scene=scene, stills=stills, thumbnail=thumbnail, film=film, notes=notes)
 
 
 def _film(
-    task: FlightTask, flight: Flight, place: Place, camera: Camera
+    task: FlightTask, flight: Flight, placed: Placed, camera: Camera
 ) -> tuple[str, tuple[str, ...]]:
     """Return the address of the film, or a note that says why there is none."""
     try:
-        return film_uri(film_of(flight, *place, camera, task.result.signature)), ()
+        return film_uri(film_of(flight, placed, camera, task.result.signature)), ()
     except GarlError as error:
         return "", (f"No film: {cut_text(str(error), 400)}",)

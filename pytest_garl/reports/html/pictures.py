@@ -20,7 +20,7 @@ from pytest_garl.reports.film.flight_video import CLOSING_S
 from pytest_garl.reports.film.pose import poses_at
 from pytest_garl.reports.html.moments import Moment, telling_moment
 from pytest_garl.reports.html.scene import jpeg_uri
-from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.environment import environment_at
@@ -103,7 +103,7 @@ def _facts(step: Step | None) -> Iterator[str]:
         yield f"in view: {', '.join(step.objects_visible)}"
 
 
-def film_of(flight: Flight, scenario: Scenario, map: Map, camera: Camera, signature: str) -> bytes:
+def film_of(flight: Flight, placed: Placed, camera: Camera, signature: str) -> bytes:
     """Return the film of a flight, which plays at its own speed, small enough for a page.
 
     Raises GarlError if there is no encoder.
@@ -113,7 +113,7 @@ def film_of(flight: Flight, scenario: Scenario, map: Map, camera: Camera, signat
     kbps = min(TOP_KBPS, int(8 * FILM_BYTES / 1000 / shown_s))
     with tempfile.TemporaryDirectory(prefix="garl-film-") as folder:
         path = Path(folder) / "film.mp4"
-        write(frames(flight, scenario, map, camera, signature), path, rate, top_kbps=kbps)
+        write(frames(flight, placed, camera, signature), path, rate, top_kbps=kbps)
         return path.read_bytes()
 
 

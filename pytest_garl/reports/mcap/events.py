@@ -49,7 +49,7 @@ def _introduction(export: Export) -> Iterator[str]:
     versions = ", ".join(f"{name} {number}" for name, number in export.flight.versions)
     yield f"flight {export.name}{f', flown with {versions}' if versions else ''}"
     place = export.place
-    if place is not None and (error := place.scenario["camera.calibration_error_percent"]):
+    if place is not None and (error := place.placed.scenario["camera.calibration_error_percent"]):
         yield (
             f"the camera's focal length differs by {error:+.1f} % from the one that the landing "
             "system was told; /camera/calibration has the true one"
@@ -59,7 +59,9 @@ def _introduction(export: Export) -> Iterator[str]:
 
 
 def _is_turned(place: Place) -> bool:
-    return any(place.scenario[f"camera.mounting_{axis}_deg"] for axis in ("roll", "pitch", "yaw"))
+    return any(
+        place.placed.scenario[f"camera.mounting_{axis}_deg"] for axis in ("roll", "pitch", "yaw")
+    )
 
 
 def _happened(flight: Flight) -> Iterator[tuple[int, LogLevel, str, str]]:

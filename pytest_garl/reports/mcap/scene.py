@@ -43,7 +43,7 @@ from pytest_garl.reports.mcap.values import (
 from pytest_garl.scenarios.bodies import Body, Part, quaternion_of, rotate
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placed import Pad, Placed, PlacedMarker, turned_about
+from pytest_garl.scenarios.placed import Pad, PlacedMarker, turned_about
 from pytest_garl.simulation.camera.canvas import BLACK_LEVEL, WHITE_LEVEL
 from pytest_garl.simulation.camera.ground import paint_ground
 from pytest_garl.simulation.camera.ground_cover import cover_shift
@@ -67,22 +67,23 @@ def scene(flight: Flight, place: Place | None) -> Iterator[Logged]:
     if place is None:
         entities.append(_marker_place(flight))
     else:
-        entities += [_static(body) for body in place.map.bodies]
-        entities += _board(Placed(place.scenario, place.map).pad)
-        entities.append(_bounds(place.map))
+        entities += [_static(body) for body in place.placed.map.bodies]
+        entities += _board(place.placed.pad)
+        entities.append(_bounds(place.placed.map))
     entities += [_decoy(number, *decoy) for number, decoy in enumerate(flight.decoys, start=1)]
     yield Logged(time_ns=0, topic=SCENE, message=SceneUpdate(entities=entities))
 
 
 def ground(place: Place) -> Iterator[Logged]:
     """Yield the ground as it was painted for the flight, as a grid of colours, once."""
-    x_min, x_max, y_min, y_max = place.map.bounds_m
+    placed = place.placed
+    x_min, x_max, y_min, y_max = placed.map.bounds_m
     left, low = x_min - MARGIN_M, y_min - MARGIN_M
     columns = math.ceil((x_max + MARGIN_M - left) / CELL_M)
     rows = math.ceil((y_max + MARGIN_M - low) / CELL_M)
-    shift = cover_shift(generator(place.scenario.seed, "sensor"))
-    pad = Placed(place.scenario, place.map).pad
-    wide = paint_ground(place.map, conditions_of(place.scenario), shift, pad).wide
+    shift = cover_shift(generator(placed.scenario.seed, "sensor"))
+    conditions = conditions_of(placed.scenario)
+    wide = paint_ground(placed.map, conditions, shift, placed.pad).wide
     origin_px = -left / CELL_M - 0.5, rows + low / CELL_M - 0.5
     picture = ground_from_above(wide, origin_px, 1 / CELL_M, (columns, rows))
     # Rows of a grid go north, those of a picture south.

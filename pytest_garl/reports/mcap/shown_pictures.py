@@ -20,7 +20,6 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.reports.film.drawing import Image
 from pytest_garl.reports.film.pose import Poses, poses_at
 from pytest_garl.reports.mcap.source import Place
-from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.exposure import Movement
@@ -55,10 +54,11 @@ class ShownPictures:
     """The pictures of one flight; ``camera`` is the camera as it is, not as it is declared."""
 
     def __init__(self, flight: Flight, place: Place, declared: Camera) -> None:
-        self._flight, self._place = flight, place
-        self.camera = true_camera(declared, place.scenario)
-        self._mounting = Mounting(place.scenario)
-        self.times_s = taken_s(flight.steps, place.scenario, declared)
+        self._flight, self._placed = flight, place.placed
+        scenario = place.placed.scenario
+        self.camera = true_camera(declared, scenario)
+        self._mounting = Mounting(scenario)
+        self.times_s = taken_s(flight.steps, scenario, declared)
 
     @property
     def turn(self) -> Quaternion:
@@ -67,8 +67,8 @@ class ShownPictures:
 
     def __iter__(self) -> Iterator[ShownPicture]:
         """Draw the pictures one after the other, in the order of time."""
-        flight, scenario = self._flight, self._place.scenario
-        renderer = renderer_of(Placed(scenario, self._place.map), self.camera)
+        flight, scenario = self._flight, self._placed.scenario
+        renderer = renderer_of(self._placed, self.camera)
         outage, freezes = Event(scenario, "outage"), scenario["outage.frozen"] > 0
         last = black = np.zeros((self.camera.height_px, self.camera.width_px, 3), np.uint8)
         present = scenario

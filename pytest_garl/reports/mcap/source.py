@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Camera
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
 
 
@@ -15,12 +14,11 @@ from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
 class Place:
     """Where a flight of the built-in simulator was flown, and with which camera.
 
-    ``map`` has the objects that are there in the scenario (``map_in``).  ``camera`` is the one that
-    the landing system declares, None if its pictures cannot be drawn again.
+    ``camera`` is the one that the landing system declares, None if its pictures cannot be drawn
+    again.
     """
 
-    scenario: Scenario
-    map: Map
+    placed: Placed
     camera: Camera | None
 
 

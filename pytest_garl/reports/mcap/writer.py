@@ -24,7 +24,6 @@ from pytest_garl.reports.mcap.source import Export
 from pytest_garl.reports.mcap.state import sights, states
 from pytest_garl.reports.mcap.transforms import transforms
 from pytest_garl.reports.mcap.values import Logged
-from pytest_garl.scenarios.placed import Placed
 from pytest_garl.verdicts.judge import judge
 
 
@@ -63,7 +62,7 @@ def in_order(export: Export) -> Iterator[Logged]:
     streams: list[Iterable[Logged]] = [scene(flight, place), flown_path(flight)]
     pictures = None
     if place is not None:
-        check_scenario(flight, Placed(place.scenario, place.map))
+        check_scenario(flight, place.placed)
         streams.append(ground(place))
         if place.camera is not None:
             pictures = ShownPictures(flight, place, place.camera)

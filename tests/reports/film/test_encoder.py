@@ -16,13 +16,16 @@ from pytest_garl.errors import GarlError
 from pytest_garl.reports.film import save_video, write
 from pytest_garl.reports.film.drawing import Image
 from pytest_garl.reports.film.encoder import program
+from pytest_garl.scenarios.placed import Placed
 from tests.support.ffmpeg import LISTS, an_ffmpeg
 from tests.support.videos import FLOWN_S, LAWN, SCENARIO, Hovers, Video
 
 
 def test_browsers_play_the_file_at_the_flights_own_speed(video: Video, tmp_path: Path) -> None:
     path = tmp_path / "new" / "flight.mp4"
-    save_video(path, video.flight, SCENARIO, LAWN, Hovers.airframe.camera, "II:lost:descent")
+    save_video(
+        path, video.flight, Placed(SCENARIO, LAWN), Hovers.airframe.camera, "II:lost:descent"
+    )
     assert list(path.parent.iterdir()) == [path]
     meta = described(path)
     assert (meta["codec"], meta["size"], meta["fps"]) == ("h264", (1024, 656), 10.0)

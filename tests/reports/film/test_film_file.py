@@ -14,13 +14,14 @@ from pytest_garl.errors import GarlError
 from pytest_garl.reports.film import frames, gif, save_video
 from pytest_garl.reports.film.drawing import Image
 from pytest_garl.reports.film.film_file import check_film_file, write_film
+from pytest_garl.scenarios.placed import Placed
 from tests.support.ffmpeg import an_ffmpeg
 from tests.support.videos import FLOWN_S, LAWN, SCENARIO, Hovers, Video
 
 
 def test_a_gif_is_half_as_large_and_plays_again_and_again(video: Video, tmp_path: Path) -> None:
     path = tmp_path / "flight.gif"
-    save_video(path, video.flight, SCENARIO, LAWN, Hovers.airframe.camera)
+    save_video(path, video.flight, Placed(SCENARIO, LAWN), Hovers.airframe.camera)
     assert list(tmp_path.iterdir()) == [path]
     with Pillow.open(path) as shown:
         assert shown.format == "GIF"
@@ -43,7 +44,7 @@ def _durations_ms(shown: Pillow.Image) -> Iterator[float]:
 def test_the_last_seconds_are_the_end_of_the_whole_film(video: Video) -> None:
     camera = Hovers.airframe.camera
     whole = video.pictures
-    last = list(frames(video.flight, SCENARIO, LAWN, camera, "II:lost:descent", last_s=1.0))
+    last = list(frames(video.flight, Placed(SCENARIO, LAWN), camera, "II:lost:descent", last_s=1.0))
     assert 1.0 * 10 + 20 <= len(last) <= 1.0 * 10 + 21
     assert (last[-1] == whole[-1]).all()
     assert (last[0][:480, :640] == whole[-len(last)][:480, :640]).mean() > 0.9

@@ -15,6 +15,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.reports.film import frames, rate_hz
 from pytest_garl.reports.film.drawing import SYSTEM
+from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.fly import fly
 from tests.support.videos import (
     CAMERA_PART,
@@ -64,7 +65,9 @@ def test_the_pictures_change_as_time_goes_by(video: Video) -> None:
 def test_a_flight_that_never_began_has_an_end() -> None:
     flight = fly(SCENARIO, NeverBegins, policy_spec("stationary"), time_limit_s=1.0)
     assert not flight.steps
-    pictures = list(frames(flight, SCENARIO, LAWN, Hovers.airframe.camera, "V:ZeroDivisionError"))
+    pictures = list(
+        frames(flight, Placed(SCENARIO, LAWN), Hovers.airframe.camera, "V:ZeroDivisionError")
+    )
     assert len(pictures) == CLOSING_FRAMES
 
 
@@ -72,10 +75,10 @@ def test_a_flight_of_another_scenario_is_refused(video: Video) -> None:
     camera = Hovers.airframe.camera
     elsewhere = SCENARIO.replace({"marker.x": -SCENARIO["marker.x"]})
     with pytest.raises(GarlError, match=r"its marker lay at .* take the scenario and the map"):
-        next(frames(video.flight, elsewhere, LAWN, camera))
+        next(frames(video.flight, Placed(elsewhere, LAWN), camera))
     fewer = SCENARIO.without("dog-1")
     with pytest.raises(GarlError, match=r"it has the objects .*dog-1.* map 'lawn' has person-1"):
-        next(frames(video.flight, fewer, LAWN, camera))
+        next(frames(video.flight, Placed(fewer, LAWN), camera))
 
 
 def test_the_rate_is_the_recorded_one(video: Video) -> None:

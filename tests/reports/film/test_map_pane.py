@@ -8,6 +8,7 @@ import math
 from pytest_garl.flight.flight import Contact
 from pytest_garl.reports.film import frames
 from pytest_garl.reports.film.drawing import HIT, MARKER, OBJECTS, UAV
+from pytest_garl.scenarios.placed import Placed
 from tests.support.videos import LAWN, MAP_PART, SCENARIO, Hovers, Video, on_the_map, painted
 
 
@@ -40,7 +41,7 @@ def test_the_end_of_a_collision_is_crossed_out(video: Video) -> None:
         tilt_rad=0.0,
     )
     flight = dataclasses.replace(video.flight, outcome="collision", contacts=(hit,))
-    *_, last = frames(flight, SCENARIO, LAWN, Hovers.airframe.camera)
+    *_, last = frames(flight, Placed(SCENARIO, LAWN), Hovers.airframe.camera)
     crossed = painted(last[MAP_PART], HIT)
     assert math.dist(crossed.mean(axis=0), on_the_map(-5.0, 5.0)) < 1.0
     assert len(painted(video.pictures[-1][MAP_PART], HIT)) == 0

@@ -34,6 +34,6 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Exported:
     flight = fly(SCENARIO, Hovers, policy_spec("waypoint"), time_limit_s=3.0)
     seen = list(Hovers.seen)
     path = tmp_path_factory.mktemp("exported") / "flight.mcap"
-    place = Place(scenario=SCENARIO, map=Placed(SCENARIO, LAWN).map, camera=Hovers.airframe.camera)
+    place = Place(placed=Placed(SCENARIO, LAWN), camera=Hovers.airframe.camera)
     write_mcap(Export(name="lawn-g00-s00", flight=flight, place=place), path)
     return Exported(flight=flight, seen=seen, path=path, recording=read_mcap(path))

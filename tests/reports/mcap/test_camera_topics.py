@@ -62,7 +62,7 @@ def over_the_marker(**genes: float) -> tuple[Flight, Place]:
     attitude /= np.linalg.norm(attitude, axis=1, keepdims=True)
     uav = dataclasses.replace(flight.uav, attitude=attitude)
     flight = dataclasses.replace(flight, uav=uav, marker_position_m=(x, y))
-    return flight, Place(scenario=scenario, map=Placed(scenario, EMPTY).map, camera=None)
+    return flight, Place(placed=Placed(scenario, EMPTY), camera=None)
 
 
 def export(flight: Flight, place: Place, folder: Path) -> Recording:
@@ -93,7 +93,7 @@ def test_the_outline_lies_on_the_marker(
     flight, place = over_the_marker(**genes)
     camera = MODELS[model]
     recording = export(flight, dataclasses.replace(place, camera=camera), tmp_path)
-    corners = np.array([(x, y, 0.0) for x, y in Placed(place.scenario, EMPTY).pad.main.outline_m])
+    corners = np.array([(x, y, 0.0) for x, y in place.placed.pad.main.outline_m])
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50))
     read = 0
     assert len(recording.topics["/camera/image"]) == 16

@@ -71,7 +71,7 @@ def test_a_turned_body_lies_where_the_camera_draws_it() -> None:
     flight = dataclasses.replace(
         recorded(steps=seen(())), marker_position_m=Placed(SCENARIO, map).pad.place_m
     )
-    (logged,) = scene(flight, Place(scenario=SCENARIO, map=map, camera=None))
+    (logged,) = scene(flight, Place(placed=Placed(SCENARIO, map), camera=None))
     update = decoded(logged.message)
     (cube,) = next(each for each in update.entities if each.id == "box").cubes
     (hull,) = placed_hulls(mesh_of(body.parts), body.position_m, body.yaw_rad)

@@ -56,9 +56,7 @@ def flown(**genes: float) -> tuple[Flight, Scenario, list[Image]]:
 
 def again(flight: Flight, scenario: Scenario) -> ShownPictures:
     camera = Watches.airframe.camera
-    return ShownPictures(
-        flight, Place(scenario=scenario, map=Placed(scenario, LAWN).map, camera=camera), camera
-    )
+    return ShownPictures(flight, Place(placed=Placed(scenario, LAWN), camera=camera), camera)
 
 
 def difference(first: Image, second: Image) -> float:

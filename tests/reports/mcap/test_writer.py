@@ -42,7 +42,7 @@ WITHOUT_PLACE = {
 
 
 def hovering(exported: Exported) -> Export:
-    place = Place(scenario=SCENARIO, map=Placed(SCENARIO, LAWN).map, camera=Hovers.airframe.camera)
+    place = Place(placed=Placed(SCENARIO, LAWN), camera=Hovers.airframe.camera)
     return Export(name="lawn-g00-s00", flight=exported.flight, place=place)
 
 
@@ -107,7 +107,7 @@ def test_a_flight_of_another_scenario_is_refused(exported: Exported, tmp_path: P
     elsewhere = SCENARIO.replace({"marker.x": -SCENARIO["marker.x"]})
     export = hovering(exported)
     assert export.place is not None
-    place = dataclasses.replace(export.place, scenario=elsewhere)
+    place = dataclasses.replace(export.place, placed=Placed(elsewhere, LAWN))
     with pytest.raises(GarlError, match="not of this scenario"):
         write_mcap(dataclasses.replace(export, place=place), tmp_path / "flight.mcap")
     assert list(tmp_path.iterdir()) == []
