@@ -193,10 +193,20 @@ class Ledger:
             flight.key,
         ).fetchone()
         if row is None or row[0] is None:
+            self._check_file()
             return None
         return CompletedFlight(
             result=parse_result(row[0]), sha256=row[1], record=flight.record(folder)
         )
+
+    def _check_file(self) -> None:
+        """Raise LedgerError if somebody emptied the file: no result would ever be read from it."""
+        try:
+            size = self.path.stat().st_size
+        except OSError as error:
+            raise LedgerError(f"{self.path}: {error.strerror}. {REMEDY}") from error
+        if size == 0:
+            raise LedgerError(f"{self.path}: somebody emptied this file. {REMEDY}")
 
     def scenario(self, flight: FlightId) -> str | None:
         """Return a slot's scenario, or None if it is not bred."""

@@ -9,7 +9,7 @@ from pytest_garl.verdicts.statistics import share_interval
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
 from pytest_garl.verdicts.wording import decided_text
 
-PAPER_DEFINITION = "by the paper's definition, flights without a landing included"
+PAPER_DEFINITION = "by the paper's definition, which counts not landing"
 """How texts call the paper's definition: its type II is "no landing occurs"."""
 
 

@@ -217,7 +217,7 @@ def test_the_text_counts_flights_whose_time_ran_out() -> None:
         "signatures": [],
     }
     told = _text({"searches": [search]})
-    assert "2 violate (2 by the paper's definition, flights without a landing included)" in told
+    assert "2 violate (2 by the paper's definition, which counts not landing)" in told
     assert "blocked 0; ran out of time: needless 1, excused 1, blocked 0\n" in told
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import VERSION
-from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger import Ledger
 from tests.execution.ledgers import FACTS, result_of, waiting_ledger
 from tests.support.results import flight_result
@@ -95,3 +95,13 @@ def test_resumed_ledger_forgets_the_facts_of_the_session(tmp_path: Path) -> None
     ledger = Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
     assert not ledger.facts.has_run("test_one")
     assert ledger.facts.selected == 7
+
+
+def test_an_emptied_ledger_ends_the_wait_for_a_flight(tmp_path: Path) -> None:
+    """As a landing system does that truncates the file: its readers would wait for ever."""
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    flight = FlightId(search="search", map="lawn", slot=Slot(generation=0, index=0))
+    assert ledger.completed(flight, tmp_path) is None
+    (tmp_path / "ledger.sqlite").write_bytes(b"")
+    with pytest.raises(LedgerError, match="emptied"):
+        ledger.completed(flight, tmp_path)

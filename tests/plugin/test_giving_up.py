@@ -143,7 +143,7 @@ def test_giving_up_is_allowed_by_the_limits(
         [
             'garl: limits of HoverThenAbort: distance 0.75 m, time 120 s, abort="ok"',
             "HoverThenAbort on lawn: 4 flown, landed 0.0 %, violations 0.0 %*",
-            "  by the paper's definition, flights without a landing included: violations 100.0 %",
+            "  by the paper's definition, which counts not landing: violations 100.0 %",
             "  gave up: needless 100.0 %, *",
             '  limits: distance 0.75 m, time 120 s, abort="ok"',
             "HoverThenAbort on lawn: landed within the limits in none of 4 flights, so*",
@@ -206,7 +206,7 @@ def test_giving_up_is_excused_where_nobody_can_read_the_marker(
     result.stdout.fnmatch_lines(
         [
             "HoverThenAbort on lawn: 4 flown, landed 0.0 %, violations 0.0 % [[]0.0, 60.2[]]",
-            "  by the paper's definition, flights without a landing included: violations 100.0 %",
+            "  by the paper's definition, which counts not landing: violations 100.0 %",
             "  gave up: needless 0.0 %, excused 100.0 %, blocked 0.0 %; not landed 0.0 %",
             "HoverThenAbort on lawn: landed within the limits in none of 4 flights, so*",
         ]

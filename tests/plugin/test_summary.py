@@ -68,7 +68,7 @@ def test_summary_counts_failures_of_users_properties_as_violations(
     result.stdout.fnmatch_lines(
         [
             "Good on lawn: 4 flown, landed 100.0 %, violations 100.0 %*",
-            "  by the paper's definition, flights without a landing included: violations 0.0 %",
+            "  by the paper's definition, which counts not landing: violations 0.0 %",
             "  gave up: needless 0.0 %, excused 0.0 %, blocked 0.0 %; not landed 0.0 %",
             "*distance decided in 4 of 4 flights, time in 4",
             "*4  own:test_own:*",
@@ -89,7 +89,7 @@ def test_step_summary_holds_a_table_of_violations(
     result = run(pytester, *SEARCH, "-rs", *parallel)
     lines = page.read_text().splitlines()
     assert lines[:2] == ["before", "## pytest-garl"]
-    paper = "by the paper's definition, flights without a landing included"
+    paper = "by the paper's definition, which counts not landing"
     gave_up = "gave up: needless | gave up: excused | gave up: blocked"
     assert lines[3:6:2] == [
         f"| where | flown | landed | violations | {paper} | {gave_up} "
@@ -266,7 +266,9 @@ def test_step_summary_escapes_names_outside_its_tables(
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
     name = "<img src=x>[x](y)"
     systems = pytester.path / "systems.py"
-    systems.write_text(f"{systems.read_text()}\nGood.__qualname__ = {name!r}\n")
+    systems.write_text(
+        f"{systems.read_text()}\nGood.__qualname__ = {name!r}\nglobals()[{name!r}] = Good\n"
+    )
     run(pytester, *SEARCH)
     assert name.replace("<", "") in page.read_text().replace("\\", "").replace("<", "")
     assert "<img" not in page.read_text().replace("\\<", "")

@@ -67,7 +67,7 @@ def test_landed_flights_come_first_and_each_reason_has_its_share() -> None:
     search = summary(RESULTS, violating=2)
     assert headline_shares(search) == "8 flown, landed 25.0 %, violations 25.0 % [3.2, 65.1]"
     assert share_lines(search)[:3] == [
-        "by the paper's definition, flights without a landing included: violations 62.5 %",
+        "by the paper's definition, which counts not landing: violations 62.5 %",
         "gave up: needless 12.5 %, excused 12.5 %, blocked 12.5 %; "
         "not landed 12.5 % (of them blocked 1); hung 12.5 %; inconclusive 1",
         "landings: distance median 0.40 m, worst 0.60 m; time median 30.0 s, worst 40.0 s",
