@@ -15,7 +15,7 @@ from tests.support.landing_project import (
         ("Good", "['moon']", "*unknown map 'moon'; expected one of court, *lawn*"),
         ("NoStep", "['lawn']", "*NoStep has no method 'step'*"),
         ("Good()", "['lawn']", "*expected a class*"),
-        ("(lambda: type('Local', (Good,), {}))()", "['lawn'], limits=dict(mass=1)", "*mass*"),
+        ("Good", "['lawn'], limits=dict(mass=1)", "*mass*"),
     ],
 )
 def test_an_invalid_marker_is_one_error_and_other_tests_run(

@@ -96,7 +96,9 @@ def reader_of(workers: int, remaining: RemainingWork | None = None) -> ProgressR
 
 
 def read(reader: ProgressReader, queries: Flown) -> RunProgress:
-    found = reader.read(cast(Ledger, SimpleNamespace(queries=queries, fact=lambda key: None)))
+    found = reader.read(
+        cast(Ledger, SimpleNamespace(queries=queries, facts=SimpleNamespace(selected=0)))
+    )
     assert found is not None
     return found
 

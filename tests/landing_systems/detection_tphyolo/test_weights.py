@@ -65,7 +65,9 @@ def test_a_broken_manifest_is_refused(weights: Path, content: str) -> None:
 
 
 def test_missing_weights_are_named_with_the_command_that_makes_them(tmp_path: Path) -> None:
-    with pytest.raises(WeightsError, match=r"gone\.json cannot be read.*training\.tphyolo\.train"):
+    with pytest.raises(
+        WeightsError, match=r"gone\.json cannot be read.*lab\.train_detector\.train"
+    ):
         read_weights(tmp_path / "gone.json")
 
 
