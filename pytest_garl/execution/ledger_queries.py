@@ -34,10 +34,11 @@ class FlightSeconds:
     """Mean wall times of flights; 0 without such flights."""
 
     of_search: float
-    violating: float
-    """Of the search's flights that violated a property."""
-    beside: float
-    """Of the flights beside the search, which repeat, confirm and shrink violations."""
+    plain: float
+    """Of the search's flights that violated nothing."""
+    failing: float
+    """Of those that violated a property, and of those that repeat, confirm and shrink them."""
+    failing_count: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -221,13 +222,16 @@ class LedgerQueries:
         """Return the mean wall times of the flights so far."""
         row = self._database.execute(
             "SELECT avg(wall_s) FILTER (WHERE kind = 'search'), "
-            "avg(wall_s) FILTER (WHERE kind = 'search' "
-            "AND json_extract(result, '$.verdict.primary') IS NOT NULL), "
-            "avg(wall_s) FILTER (WHERE kind = 'on_demand') "
-            "FROM slot JOIN search ON search.id = slot.search WHERE state = 'flown'"
+            "avg(wall_s) FILTER (WHERE kind = 'search' AND NOT fails), "
+            "avg(wall_s) FILTER (WHERE kind = 'on_demand' OR kind = 'search' AND fails), "
+            "count(*) FILTER (WHERE kind = 'on_demand' OR kind = 'search' AND fails) FROM ("
+            "SELECT kind, wall_s, json_extract(result, '$.verdict.primary') IS NOT NULL AS fails "
+            "FROM slot JOIN search ON search.id = slot.search WHERE state = 'flown')"
         ).fetchone()
-        of_search, violating, beside = (float(mean or 0.0) for mean in row)
-        return FlightSeconds(of_search=of_search, violating=violating, beside=beside)
+        of_search, plain, failing = (float(mean or 0.0) for mean in row[:3])
+        return FlightSeconds(
+            of_search=of_search, plain=plain, failing=failing, failing_count=int(row[3])
+        )
 
     def flying_s(self, search: str) -> float:
         """Return the sum of the wall times of a search's flights."""

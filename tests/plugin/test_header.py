@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.landing_project import project
 
-NEXT = "; the time left follows after 8 flights"
+NEXT = "; the time left follows after 20 flights"
 
 
 TIMED = """
@@ -40,8 +40,8 @@ def test_header_says_where_it_flies_if_pytest_itself_cannot(pytester: pytest.Pyt
 
 
 def test_first_run_tells_the_time_when_it_knows_it(pytester: pytest.Pytester) -> None:
-    timed(pytester, 0.2, "['lawn', 'court']")
-    args = ("--garl-budget=12", "--garl-workers=1", "-k", "test_collisions")
+    timed(pytester, 0.1, "['lawn', 'court']")
+    args = ("--garl-budget=24", "--garl-workers=1", "-k", "test_collisions")
     first = pytester.runpytest_subprocess("-p", "no:cacheprovider", *args)
     first.stdout.fnmatch_lines(
         [
