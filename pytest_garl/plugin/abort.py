@@ -13,7 +13,8 @@ from typing import NoReturn, cast
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.plugin.keys import FATAL, is_xdist_worker
+from pytest_garl.plugin.keys import FATAL
+from pytest_garl.plugin.xdist import is_xdist_worker
 
 
 def abort_session(item: pytest.Item, error: GarlError) -> NoReturn:

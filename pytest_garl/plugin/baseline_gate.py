@@ -25,13 +25,13 @@ from pytest_garl.plugin.keys import (
     GATE_PLUGIN,
     GATE_REPORT,
     RUN,
-    is_xdist_worker,
     marker_of,
 )
 from pytest_garl.plugin.marker import read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.target import Target
+from pytest_garl.plugin.xdist import is_xdist_worker
 
 
 def register(config: pytest.Config, options: Options) -> None:

@@ -12,9 +12,10 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import slots
 from pytest_garl.messages import command
+from pytest_garl.plugin.inputs import corpus_of, repeated_slot_of
 from pytest_garl.plugin.keys import COLLECTED, marker_among
 from pytest_garl.plugin.marker import MarkerArguments, read_marker
-from pytest_garl.plugin.options import Options, options_of
+from pytest_garl.plugin.options import options_of
 from pytest_garl.plugin.target import Target
 
 NOTHING_TO_FLY = (
@@ -29,21 +30,19 @@ def make_items(metafunc: pytest.Metafunc, marker: pytest.Mark | None) -> Iterato
     A mark of a parameter, ``pytest.param(System, marks=pytest.mark.garl(...))``, comes before that
     of the test.  Raises CollectError if an item has no mark, or an invalid one.
     """
-    name, options = metafunc.definition.nodeid, options_of(metafunc.config)
+    name = metafunc.definition.nodeid
     try:
         if marker is not None and not _has_marked_parameters(metafunc.definition):
-            parametrize(metafunc, marker, options)
+            parametrize(metafunc, marker)
             yield
         else:
             yield
-            _parametrize_each(metafunc, marker, options)
+            _parametrize_each(metafunc, marker)
     except GarlError as error:
         raise pytest.Collector.CollectError(f"{name}: {error}") from error
 
 
-def _parametrize_each(
-    metafunc: pytest.Metafunc, marker: pytest.Mark | None, options: Options
-) -> None:
+def _parametrize_each(metafunc: pytest.Metafunc, marker: pytest.Mark | None) -> None:
     """Give each combination of parameters the slots of its own mark.
 
     ``Metafunc.parametrize`` alone cannot: it combines its values with all that came before.
@@ -57,7 +56,7 @@ def _parametrize_each(
             name = f"{metafunc.definition.nodeid}[{call.id}]"
             raise pytest.Collector.CollectError(_without_mark(name))
         metafunc._calls = [call]
-        parametrize(metafunc, own, options)
+        parametrize(metafunc, own)
         made += metafunc._calls
     metafunc._calls = made
 
@@ -77,14 +76,15 @@ def _has_marked_parameters(definition: pytest.Item) -> bool:
     return False
 
 
-def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark, options: Options) -> None:
+def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark) -> None:
     """Make one item for each target of a marked test; without targets make one skipped item.
 
     Raises GarlError if the marker is invalid.
     """
+    options = options_of(metafunc.config)
     arguments = read_marker(marker, options)
     _note(metafunc, arguments)
-    targets = targets_for(arguments, options, metafunc.definition.originalname)
+    targets = targets_for(arguments, metafunc.config, metafunc.definition.originalname)
     if targets:
         ids = [target.name for target in targets]
         return metafunc.parametrize("garl_slot", targets, ids=ids, indirect=True)
@@ -110,27 +110,31 @@ def _note(metafunc: pytest.Metafunc, arguments: MarkerArguments) -> None:
     )
 
 
-def targets_for(arguments: MarkerArguments, options: Options, test: str) -> list[Target]:
+def targets_for(arguments: MarkerArguments, config: pytest.Config, test: str) -> list[Target]:
     """Return the saved cases and the slots of a marked test called ``test``."""
+    options = options_of(config)
     if options.repeat:
         return [
-            each for map in arguments.maps for each in _repeated_targets(arguments, map, options)
+            each for map in arguments.maps for each in _repeated_targets(arguments, map, config)
         ]
     searched = [
         replace(target, slot=slot)
         for target in [arguments.on(map) for map in arguments.maps]
         for slot in slots(options.budget, options.population)
     ]
-    return [*_saved_targets(arguments, options, test), *searched]
+    return [*_saved_targets(arguments, config, test), *searched]
 
 
-def _saved_targets(arguments: MarkerArguments, options: Options, test: str) -> Iterator[Target]:
+def _saved_targets(
+    arguments: MarkerArguments, config: pytest.Config, test: str
+) -> Iterator[Target]:
+    options = options_of(config)
     if not options.cases.is_dir() and not options.cases.is_symlink():
         return
     from pytest_garl.scenarios.maps.loading import map_names
 
     known_maps = map_names(options.map_folders)
-    for entry in options.corpus.entries(arguments.target.system_name):
+    for entry in corpus_of(config).entries(arguments.target.system_name):
         header = entry.header
         if header is None or header.map not in known_maps:
             yield replace(arguments.target, entry=entry)
@@ -143,7 +147,8 @@ def _saved_targets(arguments: MarkerArguments, options: Options, test: str) -> I
             yield replace(target, live=True)
 
 
-def _repeated_targets(arguments: MarkerArguments, map: str, options: Options) -> list[Target]:
+def _repeated_targets(arguments: MarkerArguments, map: str, config: pytest.Config) -> list[Target]:
+    options = options_of(config)
     if Path(options.repeat).is_file():
         from pytest_garl.files.toml import parse
         from pytest_garl.scenarios.files import map_name_in
@@ -158,7 +163,7 @@ def _repeated_targets(arguments: MarkerArguments, map: str, options: Options) ->
         if map_name_in(text, source=options.repeat) != map:
             return []
         return [replace(arguments.on(map), file=options.repeat)]
-    slot = options.repeated_slot
-    if slot is None or slot.map != map or arguments.target.system_name not in slot.scenarios:
+    stored = repeated_slot_of(config)
+    if stored is None or stored.map != map or arguments.target.system_name not in stored.scenarios:
         return []
-    return [replace(arguments.on(map), slot=slot.slot)]
+    return [replace(arguments.on(map), slot=stored.slot, stored=stored)]

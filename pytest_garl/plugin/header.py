@@ -69,7 +69,7 @@ def domain_lines(run: Run) -> list[str]:
 
 def acceptance_warning(run: Run) -> list[str]:
     """Return a warning if git cannot tell which cases are committed."""
-    problem = run.options.corpus.acceptance.problem
+    problem = run.corpus.acceptance.problem
     if not problem:
         return []
     return [

@@ -31,7 +31,6 @@ from pytest_garl.plugin.keys import (
     closest_mark,
     has_slot,
     is_landing_item,
-    is_xdist_worker,
     marker_among,
     marker_of,
     name_slots,
@@ -40,6 +39,7 @@ from pytest_garl.plugin.keys import (
 )
 from pytest_garl.plugin.lost_cases import Collected
 from pytest_garl.plugin.tally import Tally
+from pytest_garl.plugin.xdist import is_xdist_worker
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
@@ -94,6 +94,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
     options = options_of(config)
     check_usage(options)
+    if options.repeat:
+        from pytest_garl.plugin.inputs import repeated_slot_of
+
+        # An earlier search that cannot be read ends the session before anything is flown.
+        repeated_slot_of(config)
     if options.baseline is not None:
         from pytest_garl.plugin.baseline_gate import register
 

@@ -60,7 +60,7 @@ def case_state(run: Run, target: Target) -> CaseState | None:
         signature=entry.case.ending,
         status=entry.case.status,
         reason=entry.case.reason,
-        accepted=run.options.corpus.is_accepted(entry),
+        accepted=run.corpus.is_accepted(entry),
     )
 
 

@@ -39,7 +39,6 @@ from pytest_garl.plugin.keys import (
     UNPROVEN,
     USER_FAILURE,
     WORKER_ASSERTION,
-    is_xdist_worker,
     target_of,
 )
 from pytest_garl.plugin.outcomes import (
@@ -53,6 +52,7 @@ from pytest_garl.plugin.report_text import FailureText
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.target import Target
+from pytest_garl.plugin.xdist import is_xdist_worker
 from pytest_garl.reports.html.naming import page_address, page_name
 
 
@@ -196,7 +196,7 @@ class _Writer:
     def _note_excuse(self, signature: str, name: str) -> None:
         """Note the file of the known case that excuses a violation, for the summary."""
         target = self.target
-        file = folder_of(self.run.options.corpus.folder, target.system_name) / name
+        file = folder_of(self.run.corpus.folder, target.system_name) / name
         slot = [target.system_name, target.map, target.name]
         self._note(EXCUSED, json.dumps([*slot, signature, shown_path(file, self.item.config)]))
 

@@ -95,11 +95,6 @@ FATAL = "garl.fatal"
 """Why the run cannot go on."""
 
 
-def is_xdist_worker(config: pytest.Config) -> bool:
-    """Whether this process is one of pytest-xdist's workers."""
-    return hasattr(config, "workerinput")
-
-
 def is_landing_item(item: pytest.Item) -> bool:
     """Whether an item needs a run: a landing test, or a gate against a baseline."""
     return target_of(item) is not None or hasattr(item, "garl_gate")

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_garl.plugin.keys import FOUND, LOST, is_xdist_worker
+from pytest_garl.plugin.inputs import corpus_of
+from pytest_garl.plugin.keys import FOUND, LOST
+from pytest_garl.plugin.xdist import is_xdist_worker
 
 if TYPE_CHECKING:
     from pytest_garl.cases.collected_tests import CollectedTest, Collection
@@ -76,7 +78,7 @@ def lost_case_items(
         return [_item(session, options.cases, missing)]
     from pytest_garl.cases.census import census
 
-    lost = census(options.corpus, collection_of(config, options, collected))
+    lost = census(corpus_of(config), collection_of(config, options, collected))
     return [_item(session, each.path, each.reason) for each in lost]
 
 

@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.flight_id import Slot
 from pytest_garl.npcs.catalogue import policy_names
 from pytest_garl.npcs.domain_policy import domain_with_policy, policy_in
 from pytest_garl.plugin.arguments import DEFAULT_CASES, OPTIONS, Option
-from pytest_garl.plugin.keys import is_xdist_worker
-from pytest_garl.plugin.option_values import among, filmed, integer, number, wrong
-from pytest_garl.plugin.report_options import report_folder, report_url
+from pytest_garl.plugin.option_values import (
+    among,
+    filmed,
+    integer,
+    number,
+    report_folder,
+    report_url,
+    wrong,
+)
+from pytest_garl.plugin.xdist import given_by_controller, is_xdist_worker
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.search.catalogue import default_policy, find_method, method_names
 
 if TYPE_CHECKING:
-    from pytest_garl.cases.corpus import Corpus
-    from pytest_garl.execution.stored_ledger import StoredSlot
     from pytest_garl.scenarios.domains.domain import Domain
 
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
@@ -60,8 +63,6 @@ class Options:
     timeout_s: float
     repeat: str
     """A slot or a scenario file to fly again, or empty."""
-    repeated_slot: StoredSlot | None
-    """The slot that ``repeat`` names, as the earlier search flew it."""
     duplicates: Literal["xfail", "fail"]
     npcs: str
     """The NPC policy that an option names; empty: the domain's, or that of the repeated slot."""
@@ -113,13 +114,6 @@ class Options:
         """Folders of a user's own maps."""
         return (self.root / "scenarios" / "maps",)
 
-    @functools.cached_property
-    def corpus(self) -> Corpus:
-        """The saved cases, read once."""
-        from pytest_garl.cases.corpus import Corpus
-
-        return Corpus(self.cases, self.map_folders)
-
     @property
     def flights(self) -> Path:
         """The folder of the flights' records."""
@@ -152,8 +146,6 @@ def read_options(config: pytest.Config) -> Options:
     address = os.environ.get("RAY_ADDRESS", "")
     address = "" if address == "local" else address
     folder = config.rootpath / str(config.getini("garl_dir"))
-    repeat = _repeat(text["repeat"])
-    slot = _repeated_slot(repeat, folder / "ledger.sqlite")
     return Options(
         given=_given(config),
         budget=budget,
@@ -167,8 +159,7 @@ def read_options(config: pytest.Config) -> Options:
         ray_address=address,
         domain=_domain(config),
         timeout_s=number("timeout", text["timeout"], 1e6, "a positive number of seconds"),
-        repeat=repeat,
-        repeated_slot=slot,
+        repeat=_repeat(text["repeat"]),
         duplicates=cast(
             Literal["xfail", "fail"], among("duplicates", text["duplicates"], ("xfail", "fail"))
         ),
@@ -198,8 +189,7 @@ def population(budget: int) -> int:
 
 def controller_of(config: pytest.Config) -> str:
     """Return the id of the process that the run belongs to: xdist's controller, or this one."""
-    given: dict[str, Any] = getattr(config, "workerinput", {})
-    return str(given.get("garl_controller", os.getpid()))
+    return str(given_by_controller(config).get("garl_controller", os.getpid()))
 
 
 def _value(config: pytest.Config, option: Option) -> str:
@@ -291,7 +281,7 @@ def _npcs(text: str) -> str:
 
 
 def _seed(config: pytest.Config, text: str) -> int:
-    given: dict[str, Any] = getattr(config, "workerinput", {})
+    given = given_by_controller(config)
     if "garl_seed" in given:
         return int(given["garl_seed"])
     if text == "random":
@@ -305,16 +295,3 @@ def _repeat(text: str) -> str:
     if text and not SLOT_ID.fullmatch(text) and not Path(text).is_file():
         raise wrong("repeat", text, "a slot such as court-g03-s17, or an existing scenario file")
     return text
-
-
-def _repeated_slot(repeat: str, path: Path) -> StoredSlot | None:
-    match = SLOT_ID.fullmatch(repeat)
-    if match is None:
-        return None
-    from pytest_garl.execution.stored_ledger import read_slot
-
-    slot = Slot(generation=int(match["generation"]), index=int(match["slot"]))
-    try:
-        return read_slot(path, match["map"], slot)
-    except GarlError as error:
-        raise pytest.UsageError(f"--garl-repeat={repeat}: {error}") from error

@@ -25,7 +25,7 @@ def write_pages(reporter: Any, run: Run) -> WrittenReport | None:
     reporter.section("garl: report", sep="=")
     try:
         written = write_html_report(
-            run.ledger.path, options.report, options.corpus, workers=options.workers or None
+            run.ledger.path, options.report, run.corpus, workers=options.workers or None
         )
     except GarlError as error:
         reporter.write_line(wrapped(f"garl: {printable(str(error))}", width), red=True)

@@ -192,7 +192,7 @@ class _Flown:
         ]
         flights = (second, *self._fly([probe.scenario for probe in others]))
         for probe, flight in zip((beside, *others), flights, strict=True):
-            alike = run.options.corpus, target.system_name, flight.signature
+            alike = run.corpus, target.system_name, flight.signature
             known = excusing_case(*alike, probe.scenario, twin)
             self.results.append(_Result(probe=probe, flight=flight, known=known))
 

@@ -16,12 +16,12 @@ import pytest
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.kind_news import KindNews, news_of
 from pytest_garl.plugin.progress_text import ProgressReader, RunProgress, progress_line
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import write_lines
 from pytest_garl.plugin.termination import ControllerWatch
+from pytest_garl.plugin.xdist import is_xdist_worker
 
 REFRESH_S = 0.5
 LOG_PERIOD_S = 30.0

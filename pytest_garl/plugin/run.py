@@ -34,6 +34,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
 
 if TYPE_CHECKING:
+    from pytest_garl.cases.corpus import Corpus
     from pytest_garl.cases.follow_up import InvestigatedSignature
     from pytest_garl.cases.forecast import RemainingWork
     from pytest_garl.cases.investigations import Investigations
@@ -133,6 +134,8 @@ class Run:
     ledger: Ledger
     pool: Pool
     simulator: Reference
+    corpus: Corpus
+    """The saved cases."""
     lock: TextIO | None = None
     """Keeps other runs out of the folder."""
     investigations: Investigations | None = None
@@ -295,7 +298,7 @@ class Run:
         if options.repeat:
             return {}
         system = target.system_name
-        expected = options.corpus.expected_signatures(system, target.map, accepted=True)
+        expected = self.corpus.expected_signatures(system, target.map, accepted=True)
         return {signature: entry.path.name for signature, entry in expected.items()}
 
     @functools.cached_property
@@ -421,9 +424,7 @@ class KnownViolations:
             run = self._run
             text = run.ledger.job(target.search)
             assert text is not None
-            expected = run.options.corpus.expected_cases(
-                target.system_name, target.map, accepted=True
-            )
+            expected = run.corpus.expected_cases(target.system_name, target.map, accepted=True)
             known = [KnownCase(name=entry.path.name, case=case) for entry, case in expected]
             self._kinds[target.search] = KnownKinds(
                 run.ledger, target.search, parse_job(text), known

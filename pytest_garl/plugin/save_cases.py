@@ -16,7 +16,6 @@ from pytest_garl.cases.follow_up import InvestigatedSignature, follow_up
 from pytest_garl.cases.investigations import Investigations
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import command
-from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.kind_news import write_last_news
 from pytest_garl.plugin.options import SHRINK
 from pytest_garl.plugin.probe_items import probe_requests
@@ -25,6 +24,7 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import begin_line, counted, duration, width_of, wrapped
 from pytest_garl.plugin.user_assertions import collect_assertion
+from pytest_garl.plugin.xdist import is_xdist_worker
 
 _PATCH = ".patch"
 
@@ -95,10 +95,10 @@ def _saver(run: Run) -> Callable[[Case], Path | None]:
     """Return the function that saves a case: as a file, or in CI as a patch."""
     options = run.options
     if not os.environ.get("CI"):
-        return options.corpus.save
+        return run.corpus.save
     # A build server deletes the tree after the run; a patch can be kept.
     patches = options.folder / "patches"
-    return functools.partial(options.corpus.save_patch, patches=patches, root=options.root)
+    return functools.partial(run.corpus.save_patch, patches=patches, root=options.root)
 
 
 def _flight_s(run: Run, requests: Sequence[CaseRequest]) -> dict[str, float]:

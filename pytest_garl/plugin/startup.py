@@ -21,10 +21,12 @@ from pytest_garl.execution.ray.pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, package_sha256, reference_to
 from pytest_garl.execution.stored_ledger import check_stored, stored_flight_s
 from pytest_garl.npcs.catalogue import policy_spec
-from pytest_garl.plugin.keys import RUN, is_xdist_worker
+from pytest_garl.plugin.inputs import corpus_of
+from pytest_garl.plugin.keys import RUN
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.termination import interrupt_on_sigterm
+from pytest_garl.plugin.xdist import is_xdist_worker
 
 if TYPE_CHECKING:
     from pytest_garl.cases.investigations import Investigations
@@ -49,6 +51,7 @@ def begin_run(config: pytest.Config, options: Options) -> None:
             pool=pool,
             investigations=_investigations(config, options, ledger, pool),
             simulator=reference_to(own) if own else BUILT_IN,
+            corpus=corpus_of(config),
             lock=lock,
             flight_s=ledger.facts.earlier_flight_s,
         )
@@ -130,7 +133,7 @@ def _investigations(
     from pytest_garl.cases.investigations import Investigations
 
     shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
-    return Investigations(ledger, pool, options.corpus, shrinking, options.workers or 1)
+    return Investigations(ledger, pool, corpus_of(config), shrinking, options.workers or 1)
 
 
 def _shared_ledger(path: Path) -> Ledger:

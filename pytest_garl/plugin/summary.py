@@ -147,7 +147,7 @@ def _with_cases(run: Run, searches: list[SearchSummary]) -> list[SearchSummary]:
     systems = dict.fromkeys(each.system for each in searches)
     cases = [
         *(each.result.case for each in run.investigated),
-        *(entry.case for system in systems for entry in run.options.corpus.entries(system)),
+        *(entry.case for system in systems for entry in run.corpus.entries(system)),
     ]
     return [each.with_cases([case for case in cases if case]) for each in searches]
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from pytest_garl.cases.case import Case
     from pytest_garl.cases.corpus import CorpusEntry
+    from pytest_garl.execution.stored_ledger import StoredSlot
     from pytest_garl.landing_system import Airframe, NavigationKind
     from pytest_garl.scenarios.domains.domain import Domain
     from pytest_garl.verdicts.verdict import Limits
@@ -43,6 +44,8 @@ class Target:
     """Data files of the system, below the project's root."""
     file: str = ""
     """A scenario file to repeat; empty for a slot of a search."""
+    stored: StoredSlot | None = None
+    """The slot of an earlier search, if it is flown again."""
     entry: CorpusEntry | None = None
     """A saved case."""
     live: bool = False

@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.plugin.xdist import given_by_controller
+
 WIDTH = "garl_width"
 """The key under which xdist's controller gives its workers the width of the terminal."""
 _NARROW = 40
@@ -19,7 +21,7 @@ _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|m/s|m|s)(?!\w))")
 
 def width_of(config: pytest.Config) -> int:
     """Return the number of columns; without a terminal 80, as for pytest."""
-    given: dict[str, Any] = getattr(config, "workerinput", {})
+    given = given_by_controller(config)
     if WIDTH in given:
         return max(_NARROW, int(given[WIDTH]))
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_garl.plugin.keys import is_xdist_worker
+from pytest_garl.plugin.xdist import is_xdist_worker
 
 if TYPE_CHECKING:
     from pytest_garl.execution.ledger import Ledger

@@ -60,7 +60,7 @@ class NewKinds:
             text = ledger.job(search)
             assert text is not None, "a flight's search has a job"
             job = parse_job(text)
-            corpus = self._run.options.corpus
+            corpus = self._run.corpus
             self._known[search] = frozenset(corpus.expected_signatures(job.system.name, job.map))
         return self._known[search]
 
