@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_garl.plugin.inputs import corpus_of
 from pytest_garl.plugin.keys import FOUND, LOST
 from pytest_garl.plugin.xdist import is_xdist_worker
 
@@ -77,6 +76,7 @@ def lost_case_items(
     if missing:
         return [_item(session, options.cases, missing)]
     from pytest_garl.cases.census import census
+    from pytest_garl.plugin.inputs import corpus_of
 
     lost = census(corpus_of(config), collection_of(config, options, collected))
     return [_item(session, each.path, each.reason) for each in lost]
