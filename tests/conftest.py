@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
 
 import pytest
 
 from tests.support.other_plugins import FASTER
+from tests.support.warm_python import WarmPopen
 
 
 @pytest.fixture(scope="session", autouse=True)
 def faster_runs() -> Iterator[None]:
-    """Let runs of pytest in other processes start without other plugins."""
+    """Let runs of pytest in other processes start without other plugins, and warm."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTEST_ADDOPTS", FASTER)
+        patch.setattr(subprocess, "Popen", WarmPopen)
         yield
 
 
