@@ -25,14 +25,14 @@ from lab.near_misses import FrontArchive, NearMissArchive
 from lab.stand_in import stand_in
 from lab.stand_in_way import ORDINARY, STURDY
 from lab.table import Key, ResultTable, Row, run_study
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.search.catalogue import find_method
 from pytest_garl.search.columns import Columns, OptionalGene
 from pytest_garl.search.exploration import Exploration
 from pytest_garl.search.method import FlownScenario, Method, SearchPlan
+from pytest_garl.search.method_catalogue import find_method
 from pytest_garl.search.methods.garl import Garl, GarlParameters
 from pytest_garl.search.operators import Matrix, farthest_from_nearest
 from pytest_garl.verdicts.kinds import hill_number

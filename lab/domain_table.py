@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pytest_garl.cli.domain import range_in_words, ranges_of
+from pytest_garl.cli.domain_command import range_in_words, ranges_of
 from pytest_garl.scenarios.domains.domain import CONDITIONS
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.names import BUILT_IN
-from pytest_garl.scenarios.domains.reader import domain_named
 
 PAGE = Path(__file__).parents[1] / "docs" / "domain.md"
 BEGIN = "<!-- table of the built-in domains: python -m lab.domain_table -->\n"

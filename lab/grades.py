@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 
 from lab.table import Key, ResultTable, Row, run_study, share
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.genes import OFF, ON
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario

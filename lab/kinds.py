@@ -24,19 +24,19 @@ import numpy as np
 
 from lab.table import Key, ResultTable, Row, run_study
 from pytest_garl import cpu_dispatch
-from pytest_garl.execution.flight import judged
+from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.gate.gate_statistics import holm_adjusted
-from pytest_garl.npcs.catalogue import DEFAULT_POLICY, policy_spec
 from pytest_garl.npcs.domain_policy import policy_in
+from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY, policy_spec
 from pytest_garl.scenarios.chromosome import encode
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.catalogue import find_method
 from pytest_garl.search.columns import STRATA, Columns
 from pytest_garl.search.method import FlownScenario, SearchPlan
+from pytest_garl.search.method_catalogue import find_method
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.kinds import hill_number, kinds_in_violations
 from pytest_garl.verdicts.statistics import mann_whitney

@@ -50,8 +50,8 @@ def interfering(grade: str, mind: str) -> Interfering:
 
 def collisions(job: tuple[str, str, Uav, range]) -> int:
     """Return how many episodes end in a collision."""
-    from pytest_garl.npcs.training.graded import GradedEnv
     from pytest_garl.npcs.training.presets import PRESETS
+    from pytest_garl.npcs.training.surrogate import GradedEnv
     from pytest_garl.scenarios.maps.loading import load_map
 
     grade, name, uav, seeds = job

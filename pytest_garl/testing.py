@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution.exit_guard import refusing_end
-from pytest_garl.execution.flight import time_limit_s
+from pytest_garl.execution.fly_and_judge import time_limit_s
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.metering import CallMeter, OutOfTimeError
 from pytest_garl.execution.processes import descendants_of
@@ -36,8 +36,8 @@ from pytest_garl.landing_system import (
     VelocitySetpoint,
     airframe_of,
 )
-from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.npcs.domain_policy import domain_with_policy
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN

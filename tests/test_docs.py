@@ -38,7 +38,7 @@ def test_lines_of_the_readme_are_wrapped() -> None:
 
 
 def test_every_command_of_the_cases_page_exists() -> None:
-    from pytest_garl.cli.cases import cases
+    from pytest_garl.cli.cases_command import cases
 
     lines = (DOCS / "cases.md").read_text().splitlines()
     named = {line.split()[2] for line in lines if line.startswith("    garl cases ")}

@@ -36,6 +36,12 @@ def sources(*folders: str) -> Iterator[Path]:
         yield from sorted((ROOT / folder).rglob("*.py"))
 
 
+def meant(name: str) -> tuple[str, ...]:
+    """Return the words of a module's name, in the singular and in one order."""
+    words = (re.sub("ies$", "y", word) for word in name.split("_"))
+    return tuple(sorted(re.sub("(?<!s)s$", "", word) for word in words))
+
+
 @pytest.mark.parametrize("folder", [*FOLDERS, "tests"])
 def test_no_file_and_no_class_is_too_long(folder: str) -> None:
     long = []
@@ -103,3 +109,26 @@ def test_one_type_has_limits_and_a_nominal_value() -> None:
                 }
                 types += [node.name] * ({"low", "high", "nominal"} <= fields)
     assert types == ["Quantity"]
+
+
+def test_no_two_modules_have_names_alike() -> None:
+    """Neither the same, nor names that differ by a plural or by the order of their words."""
+    modules: dict[tuple[str, ...], list[str]] = {}
+    for path in sources("pytest_garl"):
+        if path.stem not in ("__init__", "__main__"):
+            modules.setdefault(meant(path.stem), []).append(path.relative_to(ROOT).as_posix())
+    assert [paths for paths in modules.values() if len(paths) > 1] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "other", "alike"),
+    [
+        ("case_request", "case_requests", True),
+        ("story", "stories", True),
+        ("map_names", "name_map", True),
+        ("pass", "pas", False),
+        ("case", "case_file", False),
+    ],
+)
+def test_names_are_alike_by_their_words(name: str, other: str, *, alike: bool) -> None:
+    assert (meant(name) == meant(other)) is alike

@@ -28,8 +28,8 @@ RUN_BY = {
         "tests/test_workflow.py",
         "Requirement",
     ),
-    "garl init my_landing:MyLandingSystem": ("tests/cli/test_init.py", "init"),
-    "garl check test_my_landing.py": ("tests/cli/test_check.py", "check"),
+    "garl init my_landing:MyLandingSystem": ("tests/cli/test_init_command.py", "init"),
+    "garl check test_my_landing.py": ("tests/cli/test_check_command.py", "check"),
     "pytest --garl-budget=40 test_my_landing.py": ("tests/test_pages.py", "--garl-budget"),
     TRY: ("tests/test_tutorial.py", "copytree"),
     "pytest --garl-budget=16 --garl-shrink=12 test_my_landing.py": (

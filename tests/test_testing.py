@@ -29,7 +29,7 @@ from pytest_garl import (
 )
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution import metering
-from pytest_garl.execution.flight import judged
+from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.search import probes
 from pytest_garl.simulation.system_under_test.ground_truth import Truth

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_garl.cases.case import Case, Evidence, Violation
+from pytest_garl.cases.case import Case, CaseEvidence, Violation
 from pytest_garl.cases.case_file import dump_case
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
@@ -60,7 +60,7 @@ def case_of(seed: int) -> Case:
         policy="dqn",
         policy_sha256="",
         moves=tuple((name, moves) for name, _ in map.present_objects),
-        evidence=Evidence(
+        evidence=CaseEvidence(
             trajectory_sha256="",
             cpu="",
             map_sha256=map.sha256,

@@ -20,10 +20,10 @@ import numpy as np
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl.landing_system import Camera
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
@@ -31,9 +31,9 @@ from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera import renderer as renderer_module
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.exposure import Exposure, Movement
+from pytest_garl.simulation.camera.image_sensor import Sensor
 from pytest_garl.simulation.camera.particles import Particles
 from pytest_garl.simulation.camera.projection import eye_under
-from pytest_garl.simulation.camera.sensor import Sensor
 from pytest_garl.simulation.camera.solids import PaintedSolid, Solids
 from pytest_garl.simulation.fly import fly
 

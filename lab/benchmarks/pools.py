@@ -21,10 +21,10 @@ from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.ray.pool import check_ray, ray_pool
+from pytest_garl.execution.ray.ray_pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, reference_to
 from pytest_garl.gate.record import BaselineSpec
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from tests.execution.flying import Good, job_of

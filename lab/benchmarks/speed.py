@@ -26,7 +26,7 @@ from landing_systems.modules.planning_ego import EgoPlanner
 from landing_systems.opencv_mls import OpenCvLandingSystem
 from landing_systems.tphyolo_mls import TphYoloLandingSystem
 from pytest_garl.landing_system import Camera
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placed import Placed

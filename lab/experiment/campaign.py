@@ -19,9 +19,9 @@ from pytest_garl.errors import ExperimentError, GarlError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.files.atomic import locked
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.search.catalogue import find_method
+from pytest_garl.search.method_catalogue import find_method
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

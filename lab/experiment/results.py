@@ -14,7 +14,7 @@ from typing import Any
 
 from pytest_garl.errors import ExperimentError
 from pytest_garl.files.atomic import locked, write_text_atomically
-from pytest_garl.files.reading import MEGABYTE, read_text
+from pytest_garl.files.bounded_files import MEGABYTE, read_text
 from pytest_garl.messages import listed, printable, shown
 from pytest_garl.verdicts.verdict import cause_of
 

@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from pytest_garl.files.reading import read_text
+from pytest_garl.files.bounded_files import read_text
 from pytest_garl.files.toml import LARGEST_INTEGER, Table, parse
 from pytest_garl.messages import listed, shown
 

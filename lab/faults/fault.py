@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.faults.control import ControlSystem
-from pytest_garl.execution.flight import judged
+from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.files import load
 from pytest_garl.scenarios.maps.loading import load_map

@@ -14,16 +14,16 @@ from lab.faults.fault import Fault, finds, result_of
 from lab.table import Key, ResultTable
 from pytest_garl import cpu_dispatch
 from pytest_garl.execution.result import FlightResult
-from pytest_garl.npcs.catalogue import DEFAULT_POLICY, policy_spec
 from pytest_garl.npcs.domain_policy import policy_in
+from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY, policy_spec
 from pytest_garl.scenarios.chromosome import encode
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.columns import Columns
 from pytest_garl.search.method import FlownScenario, SearchPlan
+from pytest_garl.search.method_catalogue import make_method
 from pytest_garl.simulation.npc_policy import PolicySpec
 
 DOMAIN = domain_named("field")

@@ -18,7 +18,7 @@ from lab.pictures.flight_sheet import sheet
 from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Camera
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.groups import WEATHER
 from pytest_garl.scenarios.maps.loading import load_map

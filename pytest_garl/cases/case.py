@@ -76,7 +76,7 @@ class Worst:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Evidence:
+class CaseEvidence:
     """The measurements that support a case.
 
     ``neighbours_failed`` of ``neighbours`` slightly different scenarios failed with the same
@@ -201,7 +201,7 @@ class Case:
     policy: str
     policy_sha256: str
     moves: Moves
-    evidence: Evidence
+    evidence: CaseEvidence
     limits: Limits
     changes: Changes = ()
     test: str = ""

@@ -13,10 +13,10 @@ from typing import cast, get_args
 from pytest_garl.cases.case import (
     NOT_ASKED,
     Case,
+    CaseEvidence,
     ChangeList,
     Changes,
     Escape,
-    Evidence,
     MoveList,
     Moves,
     Preventable,
@@ -33,7 +33,7 @@ from pytest_garl.cases.case_header import (
 )
 from pytest_garl.errors import ScenarioError
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
-from pytest_garl.files.reading import read_text
+from pytest_garl.files.bounded_files import read_text
 from pytest_garl.files.toml import Table, finite, parse, quoted
 from pytest_garl.messages import printable, shown
 from pytest_garl.scenarios.files import SCENARIO_KEYS, is_in_units, read_scenario, scenario_lines
@@ -280,7 +280,7 @@ def _behaviour_lines(case: Case) -> list[list[str]]:
     return [moves, changes]
 
 
-def _evidence_lines(evidence: Evidence) -> list[list[str]]:
+def _evidence_lines(evidence: CaseEvidence) -> list[list[str]]:
     return [
         [
             "[evidence]",
@@ -300,11 +300,11 @@ def _evidence_lines(evidence: Evidence) -> list[list[str]]:
     ]
 
 
-def _read_evidence(table: Table) -> Evidence:
+def _read_evidence(table: Table) -> CaseEvidence:
     hashes = {"trajectory_sha256", "map_sha256", "system_sha256", "simulator_sha256"}
     table.refuse_unknown(hashes | {"cpu", "neighbours", "neighbours_failed", "removed", "versions"})
     versions = table.table("versions")
-    return Evidence(
+    return CaseEvidence(
         trajectory_sha256=table.string("trajectory_sha256"),
         cpu=table.string("cpu"),
         map_sha256=table.string("map_sha256"),

@@ -13,7 +13,7 @@ from pathlib import Path
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.case_file import dump_case, load_case, load_header
 from pytest_garl.cases.case_header import CaseHeader
-from pytest_garl.cases.cause import cause_of_case
+from pytest_garl.cases.shrunk_cause import cause_of_case
 from pytest_garl.cases.worst import worst_in
 from pytest_garl.errors import CorpusError, ScenarioError
 from pytest_garl.files.atomic import locked, write_text_atomically

@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pytest_garl.cases.candidates import SearchSignature
 from pytest_garl.cases.case import Case, Worst
 from pytest_garl.cases.case_request import CaseRequest, CaseResult
-from pytest_garl.cases.case_requests import SearchSignature
-from pytest_garl.cases.cause import cause_of_case
-from pytest_garl.cases.investigations import Investigations
+from pytest_garl.cases.investigation_queue import Investigations
+from pytest_garl.cases.shrunk_cause import cause_of_case
 from pytest_garl.cases.worst import worst_in, worst_of
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.scenarios.files import parse_scenario

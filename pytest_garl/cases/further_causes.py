@@ -23,9 +23,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.case_request import CaseRequest, CaseResult
-from pytest_garl.cases.cause import cause_of_case
 from pytest_garl.cases.known_kinds import Twin, are_alike, request_twin
 from pytest_garl.cases.new_signatures import NewSignatures, named, request_of
+from pytest_garl.cases.shrunk_cause import cause_of_case
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger

@@ -31,7 +31,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from pytest_garl.cases.case import Case
-from pytest_garl.cases.cause import Cause, cause_of_case
+from pytest_garl.cases.shrunk_cause import Cause, cause_of_case
 from pytest_garl.cases.worst import why_worse
 from pytest_garl.execution.flight_id import FlightId, search_key
 from pytest_garl.execution.job import FlightJob

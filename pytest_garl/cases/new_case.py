@@ -7,7 +7,7 @@ import dataclasses
 from pytest_garl.cases.case import (
     NOT_ASKED,
     Case,
-    Evidence,
+    CaseEvidence,
     NoGateReason,
     Prevention,
     Violation,
@@ -83,7 +83,7 @@ def new_case(
         policy_sha256=npcs.sha256,
         moves=failing.behaviour.moves,
         changes=failing.behaviour.changes,
-        evidence=Evidence(
+        evidence=CaseEvidence(
             trajectory_sha256=completed.sha256,
             cpu=flight.cpu if flight else "",
             map_sha256=job.map_sha256,

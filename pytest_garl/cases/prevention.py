@@ -27,10 +27,10 @@ from pytest_garl.cases.case import (
 from pytest_garl.cases.clearance import escaped, world_of
 from pytest_garl.cases.escape_model import Chase, EscapeModel
 from pytest_garl.cases.escape_plan import HOVERS_S, find_escape
-from pytest_garl.cases.observation import first_observation_s
+from pytest_garl.cases.observability import first_observation_s
 from pytest_garl.errors import LandingSystemError
-from pytest_garl.execution.flight import time_limit_s
 from pytest_garl.execution.flight_id import CompletedFlight
+from pytest_garl.execution.fly_and_judge import time_limit_s
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.flight.flight import Contact, Flight
 from pytest_garl.flight.flight_file import load

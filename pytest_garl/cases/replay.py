@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Literal, Self
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.cases.case import Case, Evidence
+from pytest_garl.cases.case import Case, CaseEvidence
 from pytest_garl.cases.case_test_run import CaseTestResult, run_case_tests
 from pytest_garl.errors import GarlError, LandingSystemError
 from pytest_garl.execution.exit_guard import refusing_end
-from pytest_garl.execution.flight import time_limit_s
+from pytest_garl.execution.fly_and_judge import time_limit_s
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.reference import (
     BUILT_IN,
@@ -22,7 +22,7 @@ from pytest_garl.execution.reference import (
 from pytest_garl.execution.sources import sources_sha256
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 
@@ -194,7 +194,7 @@ class SourceHashes:
     map_sha256: str
 
     @classmethod
-    def of(cls, evidence: Evidence) -> Self:
+    def of(cls, evidence: CaseEvidence) -> Self:
         """Return the hashes of the sources that gave the evidence."""
         return cls(
             system_sha256=evidence.system_sha256,

@@ -35,7 +35,7 @@ from pytest_garl.execution.reference import (
     simulator_sha256,
 )
 from pytest_garl.execution.sources import sources_sha256
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario

@@ -25,7 +25,7 @@ from pytest_garl.cases.straight_crossing import (
     straight_crossing,
 )
 from pytest_garl.flight.flight_file import load
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, Story, story_of
 

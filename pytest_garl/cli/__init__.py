@@ -27,7 +27,7 @@ COMMANDS = {
     "report": "report",
     "train": "train",
 }
-"""The subcommands, and the module of each."""
+"""The subcommands, and the module of each, without ``_command``."""
 _RESTARTED = "_PYTEST_GARL_RESTARTED"
 
 
@@ -65,7 +65,7 @@ class _Group(Pinned, click.Group):
         if cmd_name not in COMMANDS:
             return None
         cpu_dispatch.pin()
-        module = importlib.import_module(f"pytest_garl.cli.{COMMANDS[cmd_name]}")
+        module = importlib.import_module(f"pytest_garl.cli.{COMMANDS[cmd_name]}_command")
         found: click.Command = getattr(module, cmd_name)
         return found
 

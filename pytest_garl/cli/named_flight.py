@@ -10,12 +10,12 @@ from pytest_garl.cases.case import Case
 from pytest_garl.cases.case_file import load_case
 from pytest_garl.cases.corpus import Corpus
 from pytest_garl.cases.replay import Replay, replay, system_of
-from pytest_garl.cli.check import imported_system
+from pytest_garl.cli.check_command import imported_system
 from pytest_garl.cli.shared import LEDGER, say
 from pytest_garl.errors import GarlError, LedgerError
 from pytest_garl.execution.flight_id import FIRST_SLOT
 from pytest_garl.execution.stored_ledger import checked_ledger, flown_slots
-from pytest_garl.files.reading import read_text
+from pytest_garl.files.bounded_files import read_text
 from pytest_garl.files.toml import parse
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
@@ -23,7 +23,7 @@ from pytest_garl.landing_system import airframe_of
 from pytest_garl.messages import command, shortened
 from pytest_garl.reports.films import NO_RECORD, camera_of, recorded_flight, why_no_camera
 from pytest_garl.reports.html.flight_task import FlightTask, record_of
-from pytest_garl.reports.mcap.source import Export, Place
+from pytest_garl.reports.mcap.export import Export, Place
 from pytest_garl.scenarios.files import load as load_scenario
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map

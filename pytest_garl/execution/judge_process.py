@@ -20,8 +20,8 @@ from typing import IO, Any, Self
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError, PoolError
-from pytest_garl.execution.flight import FlownJob, judge_record, judged, measured
 from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.fly_and_judge import FlownJob, judge_record, judged, measured
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.processes import end_with_parent, ignore_ctrl_c
 from pytest_garl.execution.result import FlightResult

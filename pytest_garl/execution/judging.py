@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import LedgerError, SimulatorError
-from pytest_garl.execution.flight import FlownJob, judge_record
+from pytest_garl.execution.fly_and_judge import FlownJob, judge_record
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger_queue import WorkQueue
 from pytest_garl.execution.processes import failure_text
@@ -25,7 +25,7 @@ SIMULATOR = "the simulator"
 """The failed component, in the message of an error that ends the run."""
 _JUDGING = (
     "execution.severity_of_flight",
-    "scenarios.maps.reader",
+    "scenarios.maps.map_file",
     "flight.flight_file",
     "verdicts.judge",
 )

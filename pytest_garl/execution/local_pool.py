@@ -13,7 +13,7 @@ from pathlib import Path
 from pytest_garl import cpu_dispatch
 from pytest_garl.execution.checkout import Checkout
 from pytest_garl.execution.exit_guard import watched_flight
-from pytest_garl.execution.flight import fly_and_save
+from pytest_garl.execution.fly_and_judge import fly_and_save
 from pytest_garl.execution.job import TIMEOUT_S, parse_job
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue

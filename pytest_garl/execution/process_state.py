@@ -18,7 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from pytest_garl.npcs.catalogue import scripted_policies
+from pytest_garl.npcs.policy_catalogue import scripted_policies
 
 OURS = "pytest_garl"
 FLYING = (

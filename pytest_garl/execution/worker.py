@@ -11,7 +11,7 @@ from time import monotonic, sleep
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError, LandingSystemError, LedgerError, SimulatorError
 from pytest_garl.execution.checkout import isolate_imports
-from pytest_garl.execution.flight import FlownJob
+from pytest_garl.execution.fly_and_judge import FlownJob
 from pytest_garl.execution.judging import SIMULATOR, SlotJudge, failure_of, import_what_judges
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.processes import Parent, failure_text, run_worker
@@ -107,7 +107,7 @@ class Worker:
         return None
 
     def _fly(self, claim: Claim) -> FlownJob:
-        from pytest_garl.execution.flight import fly_and_save
+        from pytest_garl.execution.fly_and_judge import fly_and_save
         from pytest_garl.execution.job import parse_job
         from pytest_garl.scenarios.files import parse_scenario
 
@@ -131,7 +131,7 @@ class Worker:
 
     def _prove_simulator(self, claim: Claim) -> None:
         """Fly the scenario with the reference pilot; raise GarlError if that fails too."""
-        from pytest_garl.execution.flight import fly_and_save
+        from pytest_garl.execution.fly_and_judge import fly_and_save
         from pytest_garl.execution.job import parse_job
         from pytest_garl.execution.reference import reference_to
         from pytest_garl.scenarios.files import parse_scenario

@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.fiducial import MarkerSpec
-from pytest_garl.gate.file import Baseline, BaselineSet
+from pytest_garl.gate.baseline_file import Baseline, BaselineSet
 from pytest_garl.scenarios.task import Task
 from pytest_garl.verdicts.verdict import Limits
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from pytest_garl.cases.robustness import NEIGHBOURS, neighbours
 from pytest_garl.errors import BaselineError
 from pytest_garl.execution.flight_id import CompletedFlight
+from pytest_garl.gate.baseline_file import BaselineSet
 from pytest_garl.gate.comparison import LEVEL, Comparison, compare
-from pytest_garl.gate.file import BaselineSet
 from pytest_garl.gate.pairs import FlightSummary, Pair, summary_of
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario

@@ -15,15 +15,15 @@ from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.execution.stored_ledger import checked_ledger
-from pytest_garl.gate.file import Baseline, BaselineFlight, BaselineSet
+from pytest_garl.gate.baseline_file import Baseline, BaselineFlight, BaselineSet
 from pytest_garl.gate.gate import FlyScenarios
 from pytest_garl.gate.pairs import summary_of
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.npcs.policy_check import check_policy
 from pytest_garl.scenarios.domains.domain import Domain
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map

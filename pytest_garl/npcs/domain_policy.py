@@ -6,9 +6,9 @@ from pathlib import Path
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.messages import shown
-from pytest_garl.npcs.catalogue import policy_names
+from pytest_garl.npcs.policy_catalogue import policy_names
 from pytest_garl.scenarios.domains.domain import ABSENT, Domain
-from pytest_garl.scenarios.domains.reader import domain_named
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.story import GRADES
 
 GRADED = "graded"

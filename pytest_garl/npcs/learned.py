@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from pytest_garl.errors import PolicyError
 from pytest_garl.files.arrays import unpack
+from pytest_garl.files.bounded_files import MEGABYTE, read_bytes
 from pytest_garl.files.json_values import parse_json
-from pytest_garl.files.reading import MEGABYTE, read_bytes
 from pytest_garl.messages import listed, shown
+from pytest_garl.npcs.encodings import ENCODINGS, on_turn
 from pytest_garl.npcs.grades import GRADE_LIMITS
 from pytest_garl.npcs.interference import Belief, Interfering
-from pytest_garl.npcs.observations import ENCODINGS, on_turn
 from pytest_garl.npcs.weights import WEIGHTS
 from pytest_garl.simulation.npc_policy import STAY, Move, PolicySpec, Situation
 

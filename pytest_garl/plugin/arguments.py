@@ -11,9 +11,9 @@ from collections.abc import Iterable
 
 import pytest
 
-from pytest_garl.npcs.catalogue import DEFAULT_POLICY, policy_names
+from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY, policy_names
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
-from pytest_garl.search.catalogue import DEFAULT_METHOD, method_names
+from pytest_garl.search.method_catalogue import DEFAULT_METHOD, method_names
 
 Option = namedtuple("Option", ["name", "metavar", "help", "default"], defaults=[""])
 """One option: its name without ``garl-``, default, and what ``--help`` says."""

@@ -10,14 +10,14 @@ from typing import Any, NoReturn
 import pytest
 
 from pytest_garl.errors import GarlError
+from pytest_garl.gate.baseline_file import Baseline, BaselineSet, load_baseline
 from pytest_garl.gate.comparison import Comparison
 from pytest_garl.gate.comparison_text import report_lines, summary_lines
 from pytest_garl.gate.compatibility import environment_changes, incompatibilities
-from pytest_garl.gate.file import Baseline, BaselineSet, load_baseline
 from pytest_garl.gate.gate import compare_flights
 from pytest_garl.gate.pairs import PairResult
 from pytest_garl.messages import command
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.plugin.abort import abort_session
 from pytest_garl.plugin.keys import (
     FOUND,

@@ -49,7 +49,7 @@ def npcs(request: pytest.FixtureRequest) -> PolicySpec | None:
 
     Override this fixture in a conftest.py to choose another.
     """
-    from pytest_garl.npcs.catalogue import policy_spec
+    from pytest_garl.npcs.policy_catalogue import policy_spec
 
     run = request.config.stash.get(RUN, None)
     return policy_spec(run.options.npcs) if run and run.options.npcs else None
@@ -111,7 +111,7 @@ def scenario(request: pytest.FixtureRequest, garl_slot: Target, landing: Landing
 def _checked_policy(given: object) -> PolicySpec | None:
     """Return what the fixture ``npcs`` names; raise PolicyError for what names no policy."""
     from pytest_garl.errors import PolicyError
-    from pytest_garl.npcs.catalogue import policy_spec
+    from pytest_garl.npcs.policy_catalogue import policy_spec
     from pytest_garl.simulation.npc_policy import PolicySpec
 
     if given is None:

@@ -49,7 +49,7 @@ def limits_lines(run: Run) -> list[str]:
 
 def domain_lines(run: Run) -> list[str]:
     """Return the domains of markers that name another one, and airframes that bound a domain."""
-    from pytest_garl.scenarios.domains.navigation import within
+    from pytest_garl.scenarios.domains.own_navigation import within
 
     targets = [target for slots in run.searches.targets.values() for target in slots.values()]
     given = dict.fromkeys(

@@ -54,7 +54,7 @@ class MarkerArguments:
 
 def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     """Return the arguments of a marker; raise GarlError if one is invalid."""
-    from pytest_garl.scenarios.domains.navigation import within
+    from pytest_garl.scenarios.domains.own_navigation import within
     from pytest_garl.scenarios.maps.loading import load_map, map_names
     from pytest_garl.verdicts.verdict import Limits, LimitsOfMarker, limits
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Literal, cast
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.npcs.catalogue import policy_names
 from pytest_garl.npcs.domain_policy import domain_with_policy, policy_in
+from pytest_garl.npcs.policy_catalogue import policy_names
 from pytest_garl.plugin.arguments import DEFAULT_CASES, OPTIONS, Option
 from pytest_garl.plugin.option_values import (
     among,
@@ -25,7 +25,7 @@ from pytest_garl.plugin.option_values import (
 )
 from pytest_garl.plugin.xdist import given_by_controller, is_xdist_worker
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
-from pytest_garl.search.catalogue import default_policy, find_method, method_names
+from pytest_garl.search.method_catalogue import default_policy, find_method, method_names
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.domains.domain import Domain

@@ -28,8 +28,8 @@ from pytest_garl.files.atomic import locked, write_text_atomically
 from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Airframe
 from pytest_garl.messages import command
-from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.npcs.domain_policy import NOBODY
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.plugin.abort import abort_session
 from pytest_garl.plugin.keys import FOUND, RUN, VIOLATED_PROBE, target_of
 from pytest_garl.plugin.options import Options
@@ -39,7 +39,7 @@ from pytest_garl.plugin.target import Target
 from pytest_garl.plugin.terminal_text import counted
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.domains.domain import Domain
-from pytest_garl.scenarios.domains.navigation import within
+from pytest_garl.scenarios.domains.own_navigation import within
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from pytest_garl.cases.corpus import Corpus
     from pytest_garl.cases.follow_up import InvestigatedSignature
     from pytest_garl.cases.forecast import RemainingWork
-    from pytest_garl.cases.investigations import Investigations
+    from pytest_garl.cases.investigation_queue import Investigations
     from pytest_garl.plugin.user_assertions import ItemAssertion
 
 REFLIGHTS = 4

@@ -13,7 +13,7 @@ import pytest
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.case_request import CaseRequest
 from pytest_garl.cases.follow_up import InvestigatedSignature, follow_up
-from pytest_garl.cases.investigations import Investigations
+from pytest_garl.cases.investigation_queue import Investigations
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import command
 from pytest_garl.plugin.kind_news import write_last_news

@@ -16,19 +16,19 @@ from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.execution.sources import combined_sha256, data_files, source_hashes
-from pytest_garl.npcs.catalogue import policy_names, policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_names, policy_spec
 from pytest_garl.npcs.policy_check import check_policy
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.domains.navigation import within
+from pytest_garl.scenarios.domains.own_navigation import within
 from pytest_garl.scenarios.files import load
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.breeder import Breeder
-from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.fixed import FixedScenarios
 from pytest_garl.search.method import Method, SearchPlan
+from pytest_garl.search.method_catalogue import make_method
 from pytest_garl.simulation.npc_policy import PolicySpec
 
 

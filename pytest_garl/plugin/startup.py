@@ -17,10 +17,10 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.processes import alive
-from pytest_garl.execution.ray.pool import check_ray, ray_pool
+from pytest_garl.execution.ray.ray_pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, package_sha256, reference_to
 from pytest_garl.execution.stored_ledger import check_stored, stored_flight_s
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.plugin.inputs import corpus_of
 from pytest_garl.plugin.keys import RUN
 from pytest_garl.plugin.options import Options
@@ -29,7 +29,7 @@ from pytest_garl.plugin.termination import interrupt_on_sigterm
 from pytest_garl.plugin.xdist import is_xdist_worker
 
 if TYPE_CHECKING:
-    from pytest_garl.cases.investigations import Investigations
+    from pytest_garl.cases.investigation_queue import Investigations
 
 
 def begin_run(config: pytest.Config, options: Options) -> None:
@@ -130,7 +130,7 @@ def _investigations(
         return None
     # Only a search needs Hypothesis, which shrinks.
     from pytest_garl.cases.allowance import ShrinkBudget
-    from pytest_garl.cases.investigations import Investigations
+    from pytest_garl.cases.investigation_queue import Investigations
 
     shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
     return Investigations(ledger, pool, corpus_of(config), shrinking, options.workers or 1)

@@ -12,7 +12,7 @@ import pytest
 
 from pytest_garl.cases.reference_proofs import renewal_line
 from pytest_garl.messages import command
-from pytest_garl.plugin.films import film_lines
+from pytest_garl.plugin.failure_films import film_lines
 from pytest_garl.plugin.header import cpu_dispatch_warning
 from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, OUTSIDE, RENEWABLE, STALE
 from pytest_garl.plugin.landing import NOT_JUDGED

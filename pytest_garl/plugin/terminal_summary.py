@@ -50,7 +50,7 @@ def _write_run(reporter: Any, run: Run, tally: Tally) -> None:
     report = None
     with _one_line_if_broken(reporter, "the films"):
         if run.options.film:
-            from pytest_garl.plugin.films import draw_failures
+            from pytest_garl.plugin.failure_films import draw_failures
 
             run.films = draw_failures(reporter, run, tally)
     with _one_line_if_broken(reporter, "the summary"):

@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.files.bounded_files import read_text
 from pytest_garl.files.json_values import dataclass_from, parse_json
-from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse, quoted
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.genome_like import genome_like

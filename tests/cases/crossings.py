@@ -11,11 +11,11 @@ from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl.cases.case_request import CaseRequest
 from pytest_garl.cases.simplification import without_other_objects
 from pytest_garl.cases.straight_crossing import Encounter, straight_crossing
-from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot
+from pytest_garl.execution.fly_and_judge import fly_job
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import reference_to
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

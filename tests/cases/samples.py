@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_garl.cases.case import Case, Evidence, Violation
+from pytest_garl.cases.case import Case, CaseEvidence, Violation
 from pytest_garl.cases.case_request import CaseRequest
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import Reference
 from pytest_garl.execution.result import FlightResult
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
@@ -53,7 +53,7 @@ def case(
         policy="dqn",
         policy_sha256="ab" * 32,
         moves=((OBJECT_NAMES[-1], ((0.0, 0.0), (0.0, 0.0), (0.6, -0.8))),),
-        evidence=Evidence(
+        evidence=CaseEvidence(
             trajectory_sha256="cd" * 32,
             cpu="x86_64-avx2",
             map_sha256=LAWN.sha256,

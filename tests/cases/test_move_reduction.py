@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pytest_garl.cases.case_flights import find_colliding_object, recorded_behaviour
 from pytest_garl.cases.move_reduction import _round, shorter_records
 from pytest_garl.execution.flight_id import CompletedFlight
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.npcs.recorded import recorded_spec
 from pytest_garl.scenarios.files import is_in_units
 from pytest_garl.scenarios.genes import genome_for

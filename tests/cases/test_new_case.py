@@ -15,7 +15,7 @@ from pytest_garl.cases.new_case import case_without_flights, new_case
 from pytest_garl.cases.user_failure import UserFailure
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.severity import Severity
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.scenario import Scenario
 from tests.cases.samples import (
     COLLIDING_OBJECT,

@@ -12,14 +12,14 @@ from pytest_garl.cases.case_flights import recorded_behaviour
 from pytest_garl.cases.clearance import KEPT_M, Clearance, escaped
 from pytest_garl.cases.escape_plan import find_escape
 from pytest_garl.cases.prevention import Collision, collision_of, prevention_of
-from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId
+from pytest_garl.execution.fly_and_judge import fly_job
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.flight.flight import Step
 from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Command, Observation, VelocitySetpoint
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.files import loads
 from pytest_garl.simulation.fly import fly
 from tests.support.blind_lander import (

@@ -17,7 +17,7 @@ from pytest_garl.cases.reshrink import (
     simplicity,
 )
 from pytest_garl.cases.robustness import neighbours
-from pytest_garl.cli import cases
+from pytest_garl.cli import cases_command
 from pytest_garl.execution.reference import BUILT_IN, simulator_sha256
 from pytest_garl.execution.severity import Severity
 from pytest_garl.plugin import options
@@ -129,7 +129,7 @@ def test_reshrinker_renews_evidence_of_other_sources() -> None:
 
 
 def test_options_require_the_least_flights_of_their_modules() -> None:
-    assert cases.MINIMUM_RESHRINK_FLIGHTS == MINIMUM_RESHRINK_FLIGHTS
+    assert cases_command.MINIMUM_RESHRINK_FLIGHTS == MINIMUM_RESHRINK_FLIGHTS
     assert options.MINIMUM_SHRINK == MINIMUM_CASE_FLIGHTS
 
 

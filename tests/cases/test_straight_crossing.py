@@ -18,7 +18,7 @@ from pytest_garl.cases.straight_crossing import (
     walked_m,
 )
 from pytest_garl.flight.flight import Flight
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.story import story_of

@@ -17,7 +17,7 @@ from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.on_demand import FlyFunction
 from pytest_garl.flight.flight_file import save
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, with_all_values
 from pytest_garl.scenarios.validity import repair

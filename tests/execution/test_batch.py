@@ -11,7 +11,7 @@ from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import Reference
 from pytest_garl.gate.record import BaselineSpec
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.verdicts.verdict import Limits

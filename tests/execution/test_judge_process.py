@@ -15,8 +15,8 @@ import pytest
 
 from pytest_garl.errors import GarlError, NotFiniteError, PoolError
 from pytest_garl.execution.batch import fly_all, temporary_pool
-from pytest_garl.execution.flight import FlownJob, fly_and_save, fly_job, judged
 from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.fly_and_judge import FlownJob, fly_and_save, fly_job, judged
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool

@@ -19,7 +19,7 @@ from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.process_state import ProcessState
 from pytest_garl.execution.reference import reference_to
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.simulation import contacts, loop
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
@@ -43,7 +43,7 @@ def no_alarm() -> Iterator[None]:
 def test_imports_and_warning_filters_of_flights_are_no_change(
     state: ProcessState, tmp_path: Path
 ) -> None:
-    from pytest_garl.execution.flight import fly_job
+    from pytest_garl.execution.fly_and_judge import fly_job
 
     fly_job(job_of(Good, tmp_path), scenario(), FlightId(search="flight", map="lawn"), None)
     with warnings.catch_warnings():
@@ -158,7 +158,7 @@ def test_flight_imports_no_module_of_this_package_after_the_state_is_taken(tmp_p
         "from pytest_garl.execution import process_state, worker\n"
         "process_state.ProcessState()\n"
         "before = {*sys.modules}\n"
-        "from pytest_garl.execution.flight import fly_job\n"
+        "from pytest_garl.execution.fly_and_judge import fly_job\n"
         "from pytest_garl.execution.flight_id import FlightId\n"
         "from pytest_garl.execution.job import parse_job\n"
         "from pytest_garl.scenarios.files import parse_scenario\n"

@@ -8,7 +8,7 @@ import pytest
 
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.execution.severity_of_flight import severity_of
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.npcs.recorded import recorded_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import PoolError
-from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, Slot
+from pytest_garl.execution.fly_and_judge import fly_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import FlightWorkers
 from pytest_garl.execution.pool import wait_for

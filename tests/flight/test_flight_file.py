@@ -27,7 +27,7 @@ from pytest_garl.flight.flight import (
 )
 from pytest_garl.flight.flight_file import load, save
 from pytest_garl.landing_system import Detection, Diagnostics
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly

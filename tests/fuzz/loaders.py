@@ -20,13 +20,13 @@ from pytest_garl.cases import case_file as files
 from pytest_garl.cases import corpus
 from pytest_garl.cases.description import describe_scenario
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.fly_and_judge import fly_job
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.stored_ledger import check_stored
 from pytest_garl.flight import flight_file
-from pytest_garl.gate import file as baseline
+from pytest_garl.gate import baseline_file as baseline
 from pytest_garl.gate import record
 from pytest_garl.npcs import learned as network
 from pytest_garl.npcs.weights import WEIGHTS

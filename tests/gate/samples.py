@@ -7,15 +7,15 @@ from pathlib import Path
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference
-from pytest_garl.gate.file import (
+from pytest_garl.gate.baseline_file import (
     Baseline,
     BaselineFlight,
     BaselineSet,
 )
 from pytest_garl.gate.pairs import FlightSummary
 from pytest_garl.gate.record import BaselineSpec
-from pytest_garl.npcs.catalogue import policy_spec
-from pytest_garl.scenarios.domains.reader import domain_named
+from pytest_garl.npcs.policy_catalogue import policy_spec
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.verdicts.verdict import Limits

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import BaselineError, ScenarioError
-from pytest_garl.gate import file as baselines
+from pytest_garl.gate import baseline_file as baselines
 from pytest_garl.scenarios.maps.loading import load_map
 from tests.gate.samples import baseline
 

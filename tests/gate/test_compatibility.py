@@ -5,11 +5,11 @@ import dataclasses
 from pytest_garl.cpu_dispatch import cpu_class_of_flights
 from pytest_garl.execution.reference import Reference
 from pytest_garl.fiducial import MarkerSpec
-from pytest_garl.gate.compatibility import environment_changes, incompatibilities
-from pytest_garl.gate.file import (
+from pytest_garl.gate.baseline_file import (
     Baseline,
 )
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.gate.compatibility import environment_changes, incompatibilities
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.verdicts.verdict import Limits
 from tests.gate.samples import baseline, baseline_set, job

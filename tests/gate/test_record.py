@@ -7,8 +7,8 @@ import pytest
 
 from pytest_garl.errors import BaselineError
 from pytest_garl.gate.record import BaselineSpec, baseline_from_ledger
-from pytest_garl.npcs.catalogue import policy_spec
-from pytest_garl.scenarios.domains.reader import domain_named
+from pytest_garl.npcs.policy_catalogue import policy_spec
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.scenario import Scenario
 from tests.gate.samples import LAWN, baseline_set, job, write_ledger
 

@@ -9,7 +9,7 @@ import pytest
 from landing_systems.opencv_mls import OpenCvLandingSystem
 from landing_systems.tphyolo_mls import TphYoloLandingSystem
 from pytest_garl import Airframe, Camera
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.simulation.fly import fly
 from tests.support.flights import EMPTY, nominal
 

@@ -8,7 +8,7 @@ import pytest
 from landing_systems.mm_mls import MultiModuleLandingSystem
 from landing_systems.tphyolo_mls import TphYoloLandingSystem
 from pytest_garl.flight.flight import Flight
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

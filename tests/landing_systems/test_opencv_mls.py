@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

@@ -23,7 +23,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.processes import any_command_contains
 from pytest_garl.execution.reference import BUILT_IN
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import LAWN, job_of, scenario

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pytest_garl.errors import PolicyError
-from pytest_garl.npcs.catalogue import policy_names, policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_names, policy_spec
 from pytest_garl.npcs.policy_check import check_policy
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from tests.support.situations import MAP

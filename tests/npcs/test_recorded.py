@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pytest_garl.errors import PolicyError
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.npcs.recorded import handed_over_spec, recorded_spec
 from pytest_garl.npcs.way_out import LANDING_ZONE_M
 from pytest_garl.scenarios.chromosome import decode

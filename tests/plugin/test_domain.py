@@ -8,8 +8,8 @@ import pytest
 
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.groups import GROUPS
 from pytest_garl.scenarios.maps.loading import load_map

@@ -144,7 +144,7 @@ def test_sigterm_while_kinds_are_shrunk_names_the_way_to_continue(
     slow_project(pytester)
     conftest = (
         "import os, signal\n"
-        "from pytest_garl.cases.investigations import Investigations\n"
+        "from pytest_garl.cases.investigation_queue import Investigations\n"
         "def finish(*args):\n"
         "    os.kill(os.getpid(), signal.SIGTERM)\n"
         "Investigations.finish = finish\n"

@@ -9,8 +9,8 @@ import pytest
 
 from pytest_garl.cases.case import Worst
 from pytest_garl.cases.case_file import load_case
-from pytest_garl.cases.cause import cause_of_case
 from pytest_garl.cases.corpus import replace_file
+from pytest_garl.cases.shrunk_cause import cause_of_case
 from tests.support.case_project import SEARCH, add_cases_to_git, cases, replace_text, run, saved
 from tests.support.landing_project import project
 

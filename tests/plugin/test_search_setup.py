@@ -5,7 +5,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from pytest_garl.cases.case import Case
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.plugin.search_setup import npc_policy_of
 from tests.cases.samples import OBJECT_NAMES, case, case_with_changes
 

@@ -13,7 +13,7 @@ from pytest_garl import Camera
 from pytest_garl.errors import ScenarioError
 from pytest_garl.fiducial import MarkerSpec, NestedMarker
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.domains.reader import domain_named
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.groups import DECOY_KINDS

@@ -11,11 +11,11 @@ import pytest
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode, encode
-from pytest_garl.scenarios.domains import reader
+from pytest_garl.scenarios.domains import domain_file
 from pytest_garl.scenarios.domains.domain import CONDITIONS, Domain
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import BUILT_IN
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import Genome, active_genes, genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
@@ -202,7 +202,7 @@ def test_every_condition_has_a_meaning_and_a_source() -> None:
 @pytest.mark.parametrize("name", ["field", "calm"])
 def test_every_group_is_stated_in_the_built_in_domains(name: str) -> None:
     """A new group gets ranges there, or ``group = false``, so that nobody forgets it."""
-    file = Path(reader.__file__).with_name(f"{name}.toml")
+    file = Path(domain_file.__file__).with_name(f"{name}.toml")
     stated = tomllib.loads(file.read_text())
     assert {*GROUPS} <= {*stated}, f"give ranges, or false, in {file.name}"
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import BUILT_IN
-from pytest_garl.scenarios.domains.navigation import RTK_LIMITS, within
-from pytest_garl.scenarios.domains.reader import domain_named
+from pytest_garl.scenarios.domains.own_navigation import RTK_LIMITS, within
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.methods.random import random_scenarios
 

@@ -9,8 +9,8 @@ import pytest
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placed import Placed

@@ -8,8 +8,8 @@ import pytest
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.severity import Severity
 from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.archive import Archive
 from pytest_garl.search.columns import Columns

@@ -11,8 +11,8 @@ from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.breeder import Breeder
-from pytest_garl.search.catalogue import make_method, method_names
 from pytest_garl.search.method import FlownScenario, SearchPlan
+from pytest_garl.search.method_catalogue import make_method, method_names
 from tests.search.searches import result
 
 MAP = load_map("court")

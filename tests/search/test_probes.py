@@ -12,10 +12,10 @@ import pytest
 from pytest_garl import Camera, Start
 from pytest_garl.flight.flight import Flight, Track
 from pytest_garl.flight.thresholds import up_m
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.domains.domain import Domain
-from pytest_garl.scenarios.domains.reader import domain_named
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.task import Task

@@ -9,13 +9,13 @@ import pytest
 
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.chromosome import encode
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.method import FlownScenario, SearchPlan
+from pytest_garl.search.method_catalogue import make_method
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.verdicts.verdict import Margin
 from tests.support.results import flight_result

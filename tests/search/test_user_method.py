@@ -8,8 +8,8 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.method import FlownScenario, SearchPlan
+from pytest_garl.search.method_catalogue import make_method
 from pytest_garl.search.methods.random import RandomSearch
 from tests.support.results import flight_result
 

@@ -14,7 +14,7 @@ from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load, save
 from pytest_garl.landing_system import Airframe, Camera
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.npcs.recorded import recorded_spec
 from pytest_garl.scenarios.genes import ENVIRONMENT, genome_for
 from pytest_garl.scenarios.maps.loading import load_map

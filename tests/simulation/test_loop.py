@@ -17,7 +17,7 @@ from pytest_garl import (
     Observation,
     VelocitySetpoint,
 )
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly

@@ -6,8 +6,8 @@ import functools
 import math
 from pathlib import Path
 
-from pytest_garl.execution.flight import judged
 from pytest_garl.execution.flight_id import CompletedFlight
+from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.flight.flight import Flight
@@ -20,7 +20,7 @@ from pytest_garl.landing_system import (
     Observation,
     PositionSetpoint,
 )
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.cases.case import Case, Evidence, Violation
+from pytest_garl.cases.case import Case, CaseEvidence, Violation
 from pytest_garl.cases.corpus import Corpus
 from pytest_garl.execution.reference import BUILT_IN, simulator_sha256
 from pytest_garl.scenarios.chromosome import decode
@@ -64,7 +64,7 @@ def case_of_broken_lander() -> Case:
         policy="stationary",
         policy_sha256="",
         moves=((names[0], ()),),
-        evidence=Evidence(
+        evidence=CaseEvidence(
             trajectory_sha256="",
             cpu="",
             map_sha256=LAWN.sha256,

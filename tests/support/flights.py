@@ -13,7 +13,7 @@ from pytest_garl import (
     VelocitySetpoint,
 )
 from pytest_garl.landing_system import Airframe
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

@@ -16,7 +16,7 @@ from pytest_garl.execution.result import FlightResult
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import save
 from pytest_garl.landing_system import Camera
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario

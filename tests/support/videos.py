@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Airframe, Camera, Detection, Diagnostics
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.reports.film import frames
 from pytest_garl.reports.film.drawing import Image
 from pytest_garl.scenarios.genes import genome_for

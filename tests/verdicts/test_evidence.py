@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.execution.flight import judged
+from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.verdicts import evidence
 from pytest_garl.verdicts.verdict import Limits
 from tests.verdicts.flights import CLEAR, flight, step, touchdown

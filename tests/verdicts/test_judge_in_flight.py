@@ -18,7 +18,7 @@ from pytest_garl.landing_system import (
     PositionSetpoint,
     VelocitySetpoint,
 )
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.simulation.fly import fly

@@ -11,7 +11,7 @@ from lab.faults.control import ControlSystem, Vector
 from pytest_garl import Observation
 from pytest_garl.commands import Command
 from pytest_garl.flight.flight_file import load, save
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.files import loads
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.simulation.fly import fly

@@ -16,7 +16,7 @@ class Graded:
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Make the policy of the grade; raise PolicyError if the scenario has no story."""
-        from pytest_garl.npcs.catalogue import policy_spec
+        from pytest_garl.npcs.policy_catalogue import policy_spec
 
         name = situation.self.name
         story = story_of(situation.scenario, name)

@@ -1,21 +1,77 @@
-"""The surrogate: a Gymnasium environment on the project's own simulator and camera."""
+"""The surrogate: Gymnasium environments about one NPC, on the project's own simulator and camera.
+
+:class:`SurrogateEnv` flies from take-off to landing, :class:`GradedEnv` only the part of a landing
+in which an NPC with a grade decides.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+import math
 from typing import Any
 
+import gymnasium
 import numpy as np
+from numpy.typing import NDArray
 
+from pytest_garl.npcs.encodings import ENCODINGS, LIMIT
+from pytest_garl.npcs.grades import GRADE_LIMITS
+from pytest_garl.npcs.interference import Belief, Interference
 from pytest_garl.npcs.training import rewards
 from pytest_garl.npcs.training.episode import Episode, draw_episode, in_any_environment
-from pytest_garl.npcs.training.one_npc_env import Observation, OneNpcEnv
+from pytest_garl.npcs.training.presets import Surrogate
 from pytest_garl.npcs.training.uav_models import (
     AvoidanceParameters,
     AvoidingPilot,
     FlightStyle,
     StraightPilot,
 )
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES
+from pytest_garl.scenarios.placed import Placed, start_genes
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import GRADES, LIMITS_S, with_all_values
+from pytest_garl.scenarios.task import Start
+from pytest_garl.scenarios.validity import repair
+from pytest_garl.simulation.npc_policy import Move, Situation
+
+Observation = NDArray[np.float32]
+START_HEIGHTS_M = (3.0, 11.0)
+START_OFFSET_M = 4.0
+LATEST_COMING_S = 8.0
+"""An NPC comes at most so long after the start: a descent from 11 m takes 10 to 20 s."""
+SHORTEST_S = 0.3
+"""Share of its longest time that an NPC interferes at least."""
+AFTERMATH_STEPS = 3
+"""Half seconds for which an episode goes on after the NPC's time: a collision may follow."""
+BEYOND_SIGHT_M = 2.0
+"""An NPC starts at most so much farther from the marker than it sees."""
+_TRIES = 100
+
+
+class OneNpcEnv(gymnasium.Env[Observation, np.int64]):
+    """An environment whose observation and actions are those of a surrogate's encoding."""
+
+    def __init__(self, surrogate: Surrogate) -> None:
+        self.surrogate = surrogate
+        self._encoding = ENCODINGS[surrogate.state]
+        self.observation_space = gymnasium.spaces.Box(
+            -LIMIT, LIMIT, (self._encoding.size,), np.float32
+        )
+        self.action_space = gymnasium.spaces.Discrete(self._encoding.actions)
+        self._episode: Episode | None = None
+
+    def close(self) -> None:
+        """Free the physics of the last episode."""
+        if self._episode is not None:
+            self._episode.close()
+            self._episode = None
+
+    def _current(self) -> Episode:
+        if self._episode is None:
+            raise gymnasium.error.ResetNeeded("reset() comes before the first step()")
+        return self._episode
 
 
 class SurrogateEnv(OneNpcEnv):
@@ -84,3 +140,131 @@ class SurrogateEnv(OneNpcEnv):
     def _distance_m(self) -> float:
         situation = self._current().situations[0]
         return rewards.column_distance_m(situation.self.position_m, situation.uav_position_m)
+
+
+class GradedEnv(OneNpcEnv):
+    """One NPC that decides while it perceives the UAV; a step is one decision of its grade.
+
+    The observation and the actions are those of the encoding ``belief``.  ``info`` holds
+    ``collided`` and ``outcome``.  An episode ends with the flight, or shortly after the NPC began
+    to leave; a step after the end changes nothing.
+    """
+
+    def __init__(self, surrogate: Surrogate) -> None:
+        super().__init__(surrogate)
+        self.belief: Belief | None = None
+        self._state = np.zeros(self._encoding.size, np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Draw episodes until the NPC of one perceives the UAV; the same seed draws the same."""
+        super().reset(seed=seed)
+        for _ in range(_TRIES):
+            self.close()
+            self._begin()
+            if self._fly_to_decision():
+                return self._state, self._info()
+        raise RuntimeError(f"no NPC perceived the UAV in {_TRIES} episodes")
+
+    def step(self, action: np.int64) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Let the NPC follow its decision until the next one."""
+        if self.belief is None:
+            return self._state, 0.0, True, False, self._info()
+        return self.follow(self._encoding.moves(self.belief)[int(action)])
+
+    def follow(self, move: Move) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Let the NPC make a move, which need not be an action, until its next decision."""
+        episode, before = self._current(), self._distance_m()
+        self._interference.answer(move)
+        goes_on = self._fly_to_decision()
+        reward = rewards.collision_first(
+            before,
+            self._distance_m(),
+            collided=episode.hit is not None,
+            ended=not goes_on,
+            discount=self.surrogate.discount,
+        )
+        return self._state, reward, not goes_on, False, self._info()
+
+    def _begin(self) -> None:
+        rng, surrogate = self.np_random, self.surrogate
+        map = surrogate.maps[int(rng.integers(len(surrogate.maps)))]
+        type_name = surrogate.types[int(rng.integers(len(surrogate.types)))]
+        grade = surrogate.grades[int(rng.integers(len(surrogate.grades)))]
+        height = float(rng.uniform(*START_HEIGHTS_M))
+        scenario, place = draw_episode(map, [type_name], rng)
+        scenario = _with_story(scenario, place, grade, height, rng)
+        style = dataclasses.replace(FlightStyle.drawn(rng), cruise_m=height, begins_in_air=True)
+        pilot: Any = functools.partial(StraightPilot, style)
+        if rng.random() < {"straight": 0.0, "both": 0.5, "avoiding": 1.0}[surrogate.uav]:
+            pilot = functools.partial(AvoidingPilot, style, AvoidanceParameters.drawn(rng))
+        pilot.airframe = surrogate.airframe
+        self._episode = Episode(scenario, place, pilot)
+        self._interference = Interference(grade, self._episode.situations[0], rng)
+        self._first = True
+
+    def _fly_to_decision(self) -> bool:
+        """Fly until the NPC decides; return False if the episode ended before."""
+        episode, left = self._current(), AFTERMATH_STEPS
+        while left > 0:
+            if not self._first:
+                episode.step([self._interference.move(episode.situations[0])])
+            self._first = False
+            if episode.outcome is not None:
+                break
+            belief = self._interference.look(episode.situations[0])
+            if belief is not None:
+                self.belief, self._state = belief, self._encoding.state(belief)
+                return True
+            left -= self._interference.is_over
+        self.belief = None
+        return False
+
+    def _info(self) -> dict[str, Any]:
+        episode = self._current()
+        return {"outcome": episode.outcome or "", "collided": episode.hit is not None}
+
+    def _distance_m(self) -> float:
+        situation: Situation = self._current().situations[0]
+        return rewards.column_distance_m(situation.self.position_m, situation.uav_position_m)
+
+
+def env_of(surrogate: Surrogate) -> GradedEnv | SurrogateEnv:
+    """Return the environment of a surrogate."""
+    return GradedEnv(surrogate) if surrogate.grades else SurrogateEnv(surrogate)
+
+
+def _near(scenario: Scenario, map: Map, name: str, grade: str) -> tuple[float, float]:
+    """Return the start of an NPC, moved to where it soon perceives a UAV above the marker."""
+    placed = Placed(scenario, map)
+    (x, y), (mx, my) = placed.npc(name).start_m, placed.marker_m
+    away = math.dist((x, y), (mx, my))
+    share = min(1.0, (GRADE_LIMITS[grade].sees_within_m + BEYOND_SIGHT_M) / max(away, 1e-6))
+    return mx + share * (x - mx), my + share * (y - my)
+
+
+def _with_story(
+    scenario: Scenario, map: Map, grade: str, height_m: float, rng: np.random.Generator
+) -> Scenario:
+    """Return the scenario with a drawn story of its NPC, and a start in the air."""
+    name, kind = map.present_objects[0]
+    values = {
+        "grade": float(GRADES.index(grade)),
+        "delay_s": float(rng.uniform(0, LATEST_COMING_S)),
+        "lasts_s": LIMITS_S[grade] * float(rng.uniform(SHORTEST_S, 1.0)),
+    }
+    genes = dict(scenario.genes) | with_all_values(values, name, kind)
+    genes |= start_genes(name, _near(scenario, map, name, grade), map)
+    if OBJECT_TYPES[kind].flies:
+        bird_m = float(rng.uniform(HEIGHTS_M[0], height_m))
+        genes[f"{name}.height_m"] = bird_m
+        genes[f"{name}.stoop_m"] = float(rng.choice([0.0, rng.uniform(0, bird_m)]))
+    angle, offset = rng.uniform(0, 2 * math.pi), float(rng.uniform(0, START_OFFSET_M))
+    start = Start(
+        mode="hover",
+        height_m=height_m,
+        offset_m=(offset * math.cos(angle), offset * math.sin(angle)),
+    )
+    task = dataclasses.replace(scenario.task, start=start)
+    return repair(dataclasses.replace(scenario, genes=tuple(genes.items()), task=task), map)

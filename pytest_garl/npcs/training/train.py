@@ -17,8 +17,8 @@ from pytest_garl.npcs.training.checkpoint import (
     save_checkpoint,
 )
 from pytest_garl.npcs.training.dqn import EpisodeRecord, Experience, Learner, one_thread
-from pytest_garl.npcs.training.graded import env_of
 from pytest_garl.npcs.training.presets import Surrogate, Training
+from pytest_garl.npcs.training.surrogate import env_of
 
 
 def train(

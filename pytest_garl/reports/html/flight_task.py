@@ -32,8 +32,8 @@ from pytest_garl.reports.html.flight_view import flight_data
 from pytest_garl.reports.html.hints import hints_of
 from pytest_garl.reports.html.moments import Moment, moments_of
 from pytest_garl.reports.html.pictures import Still, film_of, film_uri, stills_of
-from pytest_garl.reports.html.scene import scene_data
 from pytest_garl.reports.html.sightings_text import sighting_sentences
+from pytest_garl.reports.html.turnable_path import scene_data
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.cover_event import renderer_of

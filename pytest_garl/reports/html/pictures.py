@@ -19,7 +19,7 @@ from pytest_garl.reports.film.encoder import TOP_KBPS
 from pytest_garl.reports.film.flight_video import CLOSING_S
 from pytest_garl.reports.film.pose import poses_at
 from pytest_garl.reports.html.moments import Moment, telling_moment
-from pytest_garl.reports.html.scene import jpeg_uri
+from pytest_garl.reports.html.turnable_path import jpeg_uri
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.renderer import Renderer

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pytest_garl.cases.case import OBSERVED_WITHIN_S
-from pytest_garl.cases.observation import OBSERVABLE_PX, pixels_of
+from pytest_garl.cases.observability import OBSERVABLE_PX, pixels_of
 from pytest_garl.flight.flight import Step
 from pytest_garl.flight.thresholds import up_m
 from pytest_garl.messages import shortened

@@ -29,7 +29,7 @@ from pytest_garl.messages import shortened
 from pytest_garl.reports.film import drawing
 from pytest_garl.reports.film.map_pane import MARGIN_M, ground_from_above
 from pytest_garl.reports.html.flight_view import UAV_RADIUS_M, UNKNOWN_SIZE_M
-from pytest_garl.reports.mcap.source import Place
+from pytest_garl.reports.mcap.export import Place
 from pytest_garl.reports.mcap.values import (
     UAV_FRAME,
     WORLD,

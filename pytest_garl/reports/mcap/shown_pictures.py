@@ -19,7 +19,7 @@ from pytest_garl.flight.flight import TRACK_RATE_HZ, Flight, Step
 from pytest_garl.landing_system import Camera
 from pytest_garl.reports.film.drawing import Image
 from pytest_garl.reports.film.pose import Poses, poses_at
-from pytest_garl.reports.mcap.source import Place
+from pytest_garl.reports.mcap.export import Place
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.exposure import Movement

@@ -16,11 +16,11 @@ from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 from pytest_garl.errors import SavingError
 from pytest_garl.reports.film.flight_video import check_scenario
 from pytest_garl.reports.mcap.camera_topics import IMAGE, camera_topics
-from pytest_garl.reports.mcap.events import events
+from pytest_garl.reports.mcap.export import Export
+from pytest_garl.reports.mcap.log_topic import events
 from pytest_garl.reports.mcap.path_topics import flown_path, plans
 from pytest_garl.reports.mcap.scene import ground, scene
 from pytest_garl.reports.mcap.shown_pictures import ShownPictures
-from pytest_garl.reports.mcap.source import Export
 from pytest_garl.reports.mcap.state import sights, states
 from pytest_garl.reports.mcap.transforms import transforms
 from pytest_garl.reports.mcap.values import Logged

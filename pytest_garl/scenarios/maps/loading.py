@@ -45,7 +45,7 @@ def _modified_ns(file: Path) -> int:
 @functools.lru_cache(maxsize=64)
 def _read(file: Path, modified_ns: int) -> Map:
     """Read a file; the cache reads it again if its modification time has changed."""
-    from pytest_garl.scenarios.maps.reader import read_map
+    from pytest_garl.scenarios.maps.map_file import read_map
 
     del modified_ns
     return read_map(file)

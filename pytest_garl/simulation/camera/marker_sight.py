@@ -13,6 +13,7 @@ from pytest_garl.flight.flight import MarkerView
 from pytest_garl.landing_system import Camera
 from pytest_garl.simulation.camera.exposure import Exposure
 from pytest_garl.simulation.camera.gloss import Gloss
+from pytest_garl.simulation.camera.image_sensor import Sensor
 from pytest_garl.simulation.camera.lens import Lens
 from pytest_garl.simulation.camera.marker_patch import (
     GREY,
@@ -21,7 +22,6 @@ from pytest_garl.simulation.camera.marker_patch import (
 )
 from pytest_garl.simulation.camera.particles import Particles
 from pytest_garl.simulation.camera.projection import NEAR_M, View
-from pytest_garl.simulation.camera.sensor import Sensor
 from pytest_garl.simulation.camera.solids import PaintedSolid, Shadow, sun_shines
 from pytest_garl.simulation.camera.weather import Conditions
 

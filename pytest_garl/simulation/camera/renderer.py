@@ -22,12 +22,12 @@ from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.gloss import add_gloss, gloss_of
 from pytest_garl.simulation.camera.ground import PaintedGround, Raster, paint_ground, repaint
 from pytest_garl.simulation.camera.ground_cover import cover_shift, covered
+from pytest_garl.simulation.camera.image_sensor import Sensor
 from pytest_garl.simulation.camera.lens import lens_of
 from pytest_garl.simulation.camera.marker_patch import paint_patch
 from pytest_garl.simulation.camera.marker_sight import BoardSight, MarkerSight
 from pytest_garl.simulation.camera.particles import Particles
 from pytest_garl.simulation.camera.projection import FAR_M, View, ground_depth
-from pytest_garl.simulation.camera.sensor import Sensor
 from pytest_garl.simulation.camera.solids import (
     BodyPose,
     PaintedSolid,

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import PoolError
-from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.flight_id import FlightId, Slot
+from pytest_garl.execution.fly_and_judge import fly_job
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightActor, FlightOutput

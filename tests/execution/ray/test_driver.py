@@ -13,7 +13,7 @@ from pytest_garl.errors import PoolError
 from pytest_garl.execution.processes import create_report_file, read_report
 from pytest_garl.execution.ray import driver as ray_driver
 from pytest_garl.execution.ray.actor import ActorWorkspace
-from pytest_garl.execution.ray.pool import check_ray
+from pytest_garl.execution.ray.ray_pool import check_ray
 
 
 class FakeRay(types.ModuleType):

@@ -20,7 +20,7 @@ from pytest_garl import (
     VehicleState,
 )
 from pytest_garl.flight.flight import Flight
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

@@ -8,7 +8,7 @@ import pytest
 from landing_systems.modules.planning_ego import LANDING, EgoPlanner
 from pytest_garl import Airframe, Command, Mission, Observation, PositionSetpoint, VelocitySetpoint
 from pytest_garl.flight.flight import Flight
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for

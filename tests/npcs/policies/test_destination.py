@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pytest_garl.errors import PolicyError
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.placed import Placed

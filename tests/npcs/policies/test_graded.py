@@ -12,8 +12,8 @@ import pytest
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl.errors import PolicyError
-from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.npcs.learned import learned_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.npcs.weights import WEIGHTS
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for

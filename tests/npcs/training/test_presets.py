@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from pytest_garl.npcs.catalogue import learned_policies
 from pytest_garl.npcs.learned import read_manifest
+from pytest_garl.npcs.policy_catalogue import learned_policies
 from pytest_garl.npcs.training.presets import PRESETS
 from pytest_garl.npcs.weights import WEIGHTS
 

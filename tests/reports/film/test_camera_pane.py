@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pytest_garl.landing_system import Camera
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.reports.film import frames
 from pytest_garl.reports.film.drawing import MARKER
 from pytest_garl.scenarios.placed import Placed, marker_genes

@@ -12,7 +12,7 @@ import pytest
 from pytest_garl import Mission
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Camera
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.reports.film import frames, rate_hz
 from pytest_garl.reports.film.drawing import SYSTEM
 from pytest_garl.scenarios.placed import Placed

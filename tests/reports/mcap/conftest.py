@@ -26,8 +26,8 @@ class Exported:
 def exported(tmp_path_factory: pytest.TempPathFactory) -> Exported:
     """Return a flight of three seconds over the lawn, exported."""
     needs_extra()
-    from pytest_garl.npcs.catalogue import policy_spec
-    from pytest_garl.reports.mcap.source import Export, Place
+    from pytest_garl.npcs.policy_catalogue import policy_spec
+    from pytest_garl.reports.mcap.export import Export, Place
     from pytest_garl.reports.mcap.writer import write_mcap
     from pytest_garl.simulation.fly import fly
 

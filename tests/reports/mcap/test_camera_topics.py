@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Camera, Detection, Diagnostics
-from pytest_garl.reports.mcap.source import Export, Place
+from pytest_garl.reports.mcap.export import Export, Place
 from pytest_garl.scenarios.placed import Placed
 from tests.reports.mcap.conftest import Exported
 from tests.support.flights import EMPTY, nominal

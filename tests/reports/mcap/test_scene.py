@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pytest_garl.reports.mcap.source import Place
+from pytest_garl.reports.mcap.export import Place
 from pytest_garl.scenarios.bodies import Body, Part
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placed import Placed

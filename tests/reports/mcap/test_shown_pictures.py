@@ -10,10 +10,10 @@ import pytest
 from pytest_garl import Abort, Command, Observation, PositionSetpoint
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Airframe, Camera
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.reports.film.drawing import Image
+from pytest_garl.reports.mcap.export import Place
 from pytest_garl.reports.mcap.shown_pictures import ShownPictures, taken_s
-from pytest_garl.reports.mcap.source import Place
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.fly import fly

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import GarlError, SavingError
-from pytest_garl.reports.mcap.source import Export, Place
+from pytest_garl.reports.mcap.export import Export, Place
 from pytest_garl.scenarios.placed import Placed
 from tests.reports.mcap.conftest import Exported
 from tests.support.mcap_files import needs_extra, read_mcap

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pytest_garl.scenarios.validity import problems
-from pytest_garl.search.catalogue import make_method, method_names
+from pytest_garl.search.method_catalogue import make_method, method_names
 from tests.search.searches import MAP, bred, plan
 
 

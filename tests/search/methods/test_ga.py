@@ -7,7 +7,7 @@ import pytest
 
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
-from pytest_garl.search.catalogue import make_method
+from pytest_garl.search.method_catalogue import make_method
 from pytest_garl.search.methods.ga import polynomial_mutation
 from tests.search.searches import MAP, bred, plan
 

@@ -9,8 +9,8 @@ import numpy as np
 from lab.stand_in import stand_in
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.chromosome import encode
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

@@ -7,8 +7,8 @@ import pytest
 
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.method import FlownScenario
+from pytest_garl.search.method_catalogue import make_method
 from pytest_garl.search.objectives import time_to_landing_s
 from tests.search.searches import GENOME, bred, plan, result
 from tests.support.results import flight_result

@@ -17,8 +17,8 @@ from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.method import FlownScenario
+from pytest_garl.search.method_catalogue import make_method
 from pytest_garl.search.methods.offline_rl import OfflineRl, edits_of, reward
 from tests.search.searches import MAP, bred, plan, result
 

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_garl.npcs.catalogue import policy_spec
-from pytest_garl.search.catalogue import make_method
+from pytest_garl.npcs.policy_catalogue import policy_spec
+from pytest_garl.search.method_catalogue import make_method
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot

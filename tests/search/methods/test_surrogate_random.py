@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from pytest_garl.search.catalogue import make_method
+from pytest_garl.search.method_catalogue import make_method
 from tests.search.searches import bred, plan
 
 

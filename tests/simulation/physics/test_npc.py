@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.search.methods.random import random_scenarios

@@ -16,7 +16,7 @@ from pytest_garl.landing_system import (
     VehicleState,
     VelocitySetpoint,
 )
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.ground_truth import told_pilot
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pytest_garl.errors import BaselineError, ScenarioError
-from pytest_garl.gate.file import (
+from pytest_garl.gate.baseline_file import (
     BaselineFlight,
     dump_baseline,
     load_baseline,

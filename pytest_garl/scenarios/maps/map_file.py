@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import cast, get_args
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.files.reading import read_bytes
+from pytest_garl.files.bounded_files import read_bytes
 from pytest_garl.files.toml import Table, parse
 from pytest_garl.messages import printable, shown
 from pytest_garl.scenarios.bodies import Body

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import cast, get_args
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.files.reading import read_text
+from pytest_garl.files.bounded_files import read_text
 from pytest_garl.files.toml import Table, parse
 from pytest_garl.messages import listed, shown
 from pytest_garl.scenarios.domains.domain import ABSENT, BIRD_HEIGHT, CONDITIONS, ELEVATION, Domain

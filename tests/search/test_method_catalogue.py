@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.npcs.catalogue import DEFAULT_POLICY, policy_names
 from pytest_garl.npcs.domain_policy import GRADED, domain_with_policy, policy_in
-from pytest_garl.search.catalogue import (
+from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY, policy_names
+from pytest_garl.search.method_catalogue import (
     DEFAULT_METHOD,
     declaration_of,
     default_policy,
@@ -36,7 +36,7 @@ def test_a_method_declares_its_policy_and_a_users_method_gets_the_default() -> N
 
 def test_the_catalogue_imports_no_method_and_no_numpy() -> None:
     code = (
-        "import sys; from pytest_garl.search.catalogue import method_names; method_names(); "
+        "import sys; from pytest_garl.search.method_catalogue import method_names; method_names(); "
         "print(*[name for name in sys.modules if 'numpy' in name or '.methods' in name])"
     )
     command = [sys.executable, "-c", code]

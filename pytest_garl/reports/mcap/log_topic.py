@@ -9,7 +9,7 @@ from foxglove.messages import Log, LogLevel
 
 from pytest_garl.flight.flight import Flight
 from pytest_garl.messages import shortened
-from pytest_garl.reports.mcap.source import Export, Place
+from pytest_garl.reports.mcap.export import Export, Place
 from pytest_garl.reports.mcap.values import Logged, ns, stamp
 from pytest_garl.verdicts.verdict import Verdict
 

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.execution.flight import fly_job, judged, measured, time_limit_s
 from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.fly_and_judge import fly_job, judged, measured, time_limit_s
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Command, Diagnostics, Land, Observation, PositionSetpoint
-from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import LAWN, Good, job_of, scenario

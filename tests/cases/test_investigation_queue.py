@@ -9,7 +9,7 @@ import pytest
 
 from pytest_garl.cases.allowance import ShrinkBudget
 from pytest_garl.cases.case_request import CaseResult
-from pytest_garl.cases.investigations import Investigations
+from pytest_garl.cases.investigation_queue import Investigations
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim
 from tests.cases.running_search import RunningSearch, UnpunctualPool, corpus_of
@@ -146,7 +146,7 @@ def test_error_of_an_investigation_ends_the_run_after_the_search(
     def fails(*_: object) -> CaseResult:
         raise ZeroDivisionError("no case")
 
-    monkeypatch.setattr("pytest_garl.cases.investigations.build_case", fails)
+    monkeypatch.setattr("pytest_garl.cases.investigation_queue.build_case", fails)
     session = Session(tmp_path / "ledger.sqlite", EACH)
     with pytest.raises(ZeroDivisionError, match="no case"):
         session.run()

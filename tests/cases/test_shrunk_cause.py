@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from pytest_garl.cases.case import Case
-from pytest_garl.cases.cause import Cause, cause_of_case
+from pytest_garl.cases.shrunk_cause import Cause, cause_of_case
 from pytest_garl.cases.simplification import empty_scenario
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.scenario import Scenario

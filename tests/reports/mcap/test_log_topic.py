@@ -7,7 +7,7 @@ import pytest
 
 from pytest_garl.flight.flight import Crash, Event
 from pytest_garl.landing_system import Diagnostics
-from pytest_garl.reports.mcap.source import Export
+from pytest_garl.reports.mcap.export import Export
 from tests.support.mcap_files import needs_extra, read_mcap
 from tests.support.recorded_flights import recorded, seen
 
@@ -79,7 +79,7 @@ def test_no_text_names_a_folder(tmp_path: Path) -> None:
     ],
 )
 def test_folders_of_paths_are_left_out(text: str, shown: str) -> None:
-    from pytest_garl.reports.mcap.events import without_folders
+    from pytest_garl.reports.mcap.log_topic import without_folders
 
     assert without_folders(text) == shown
 

@@ -182,7 +182,7 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
     replayed = replay(project.proved(case), project.root, project.maps, live=live)
     _show_replay(replayed)
     if video is not None:
-        from pytest_garl.cli.film import draw
+        from pytest_garl.cli.film_command import draw
         from pytest_garl.cli.named_flight import flown_again
 
         draw(flown_again(file, case, replayed, project.root, live=live), video)

@@ -15,7 +15,7 @@ import click
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Airframe, airframe_of
-from pytest_garl.npcs.catalogue import DEFAULT_POLICY
+from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY
 from pytest_garl.npcs.training.presets import PRESETS, Preset, Reward, Uav
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.story import GRADES

@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from pytest_garl.cli import main, skeleton
-from pytest_garl.cli.init import SKELETON
+from pytest_garl.cli.init_command import SKELETON
 from tests.plugin.test_resume import SLOW
 from tests.support.landing_project import CONFTEST
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pytest_garl.errors import GarlError
-from pytest_garl.npcs.catalogue import DEFAULT_POLICY
+from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import PolicyError
-from pytest_garl.npcs.catalogue import (
+from pytest_garl.npcs.policy_catalogue import (
     DEFAULT_POLICY,
     learned_policies,
     policy_names,
@@ -34,7 +34,7 @@ def test_an_unknown_name_lists_the_known_ones() -> None:
 
 def test_the_catalogue_imports_no_policy_and_no_numpy() -> None:
     code = (
-        "import sys; from pytest_garl.npcs.catalogue import policy_names; policy_names(); "
+        "import sys; from pytest_garl.npcs.policy_catalogue import policy_names; policy_names(); "
         "print(*[name for name in sys.modules if 'numpy' in name or '.policies' in name])"
     )
     command = [sys.executable, "-c", code]

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from pytest_garl.cases.observation import OBSERVABLE_PX, first_observation_s
+from pytest_garl.cases.observability import OBSERVABLE_PX, first_observation_s
 from pytest_garl.flight.flight import Flight, Step
 from tests.support.blind_lander import blind_flight
 

@@ -13,13 +13,13 @@ from gymnasium.utils.env_checker import check_env
 
 from pytest_garl.npcs.minds import Intercepting
 from pytest_garl.npcs.training.episode import draw_episode
-from pytest_garl.npcs.training.graded import (
+from pytest_garl.npcs.training.presets import PRESETS
+from pytest_garl.npcs.training.surrogate import (
     LATEST_COMING_S,
     GradedEnv,
     _with_story,
     env_of,
 )
-from pytest_garl.npcs.training.presets import PRESETS
 from pytest_garl.scenarios.story import LIMITS_S, story_of
 from tests.npcs.training.surrogates import COURT, OURS
 

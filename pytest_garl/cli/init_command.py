@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from pytest_garl.cli import skeleton
-from pytest_garl.cli.check import imported_system
+from pytest_garl.cli.check_command import imported_system
 from pytest_garl.cli.pytest_settings import PYTHONPATH, SETTINGS, find_settings
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import command

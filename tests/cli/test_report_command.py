@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from pytest_garl.cli.report import _text
+from pytest_garl.cli.report_command import _text
 from pytest_garl.reports.run_report import SCHEMA
 from tests.support.landing_project import result_hash, write_project
 

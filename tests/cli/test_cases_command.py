@@ -14,7 +14,7 @@ from pytest_garl.cases.corpus import Corpus, replace_file
 from pytest_garl.cases.reference_proofs import Proofs
 from pytest_garl.cases.replay import SourceHashes
 from pytest_garl.cli import main
-from pytest_garl.cli.cases import _Project
+from pytest_garl.cli.cases_command import _Project
 from pytest_garl.execution.severity import Severity
 from pytest_garl.verdicts.verdict import Limits
 from tests.cases.samples import case as dog_case

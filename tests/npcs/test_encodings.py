@@ -7,8 +7,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from pytest_garl.npcs.encodings import ACTIONS, ENCODINGS, on_turn
 from pytest_garl.npcs.interference import Belief
-from pytest_garl.npcs.observations import ACTIONS, ENCODINGS, on_turn
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import Move
 from tests.support.situations import SCENARIO, being, situation

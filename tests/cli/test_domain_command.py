@@ -10,10 +10,10 @@ from click.testing import CliRunner, Result
 
 from lab.domain_table import PAGE, with_table
 from pytest_garl.cli import main
-from pytest_garl.cli.domain import MEANINGS, ranges_of, text_of
+from pytest_garl.cli.domain_command import MEANINGS, ranges_of, text_of
 from pytest_garl.scenarios.domains.domain import CONDITIONS
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.names import BUILT_IN, DEFAULT_DOMAIN
-from pytest_garl.scenarios.domains.reader import domain_named
 
 
 def garl(*words: str) -> Result:

@@ -21,8 +21,8 @@ from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 if TYPE_CHECKING:
     from pytest_garl.execution.flight_id import CompletedFlight
     from pytest_garl.execution.reference import Reference
+    from pytest_garl.gate.baseline_file import BaselineSet
     from pytest_garl.gate.comparison import Comparison
-    from pytest_garl.gate.file import BaselineSet
     from pytest_garl.gate.record import BaselineSpec
 
 IN_PAPER = "waypoint"
@@ -134,7 +134,7 @@ def save(
     Run it where you run pytest. The same options choose the same scenarios for every system.
     """
     from pytest_garl.execution.checkout import Checkout
-    from pytest_garl.gate.file import save_baseline
+    from pytest_garl.gate.baseline_file import save_baseline
     from pytest_garl.gate.record import baseline_from_ledger, fly_baseline
 
     if ledger is not None:
@@ -157,7 +157,7 @@ def save(
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
 def show(file: Path) -> None:
     """Print how the flights of a baseline ended: landed ones first, then what went wrong."""
-    from pytest_garl.gate.file import load_baseline
+    from pytest_garl.gate.baseline_file import load_baseline
 
     for each in load_baseline(file, (_maps_folder(),)).sets:
         _show_set(each)
@@ -168,7 +168,7 @@ def show(file: Path) -> None:
 @click.argument("name")
 def scenario(file: Path, name: str) -> None:
     """Print one scenario of a baseline, such as court-17, as a file for pytest --garl-repeat."""
-    from pytest_garl.gate.file import load_baseline
+    from pytest_garl.gate.baseline_file import load_baseline
     from pytest_garl.scenarios.files import dumps
     from pytest_garl.scenarios.maps.loading import load_map
 

@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 
 from pytest_garl import Start, testing
 from pytest_garl.cli import main
-from pytest_garl.cli.check import _planned
+from pytest_garl.cli.check_command import _planned
 from pytest_garl.testing import Check, CheckPlan, ProbeResult
 
 SYSTEM = """

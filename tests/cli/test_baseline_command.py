@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from pytest_garl.cli import main
-from pytest_garl.gate.file import load_baseline
+from pytest_garl.gate.baseline_file import load_baseline
 from pytest_garl.scenarios.files import load as load_scenario
 from tests.support import tiny_simulator
 

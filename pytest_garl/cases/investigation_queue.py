@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pytest_garl.cases.allowance import Allowance, ShrinkBudget
+from pytest_garl.cases.candidates import SearchSignature, case_requests
 from pytest_garl.cases.case_request import CaseRequest, CaseResult
-from pytest_garl.cases.case_requests import SearchSignature, case_requests
 from pytest_garl.cases.corpus import Corpus
 from pytest_garl.cases.forecast import RemainingWork, remaining_work
 from pytest_garl.cases.further_causes import FurtherCauses
