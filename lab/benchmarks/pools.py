@@ -16,10 +16,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl.execution.batch import fly_all
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
+from pytest_garl.execution.on_demand import fly_all
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.ray.ray_pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, reference_to

@@ -9,10 +9,9 @@ from pathlib import Path
 from pytest_garl.cases.case_request import CaseRequest
 from pytest_garl.cases.corpus import Corpus
 from pytest_garl.cases.known_kinds import KnownCase, KnownKinds
-from pytest_garl.execution.first_violations import FirstViolations
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.ledger_queries import LedgerFlight
+from pytest_garl.execution.ledger_queries import FirstViolations, LedgerFlight
 from pytest_garl.scenarios.files import parse_scenario
 
 

@@ -18,9 +18,9 @@ from pytest_garl.cases.new_case import violation_in
 from pytest_garl.cases.reference_proofs import with_sources
 from pytest_garl.cases.replay import SourceHashes, system_of
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.batch import temporary_pool
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.local_pool import temporary_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.reference import Reference, reference_to, simulator_sha256
 from pytest_garl.execution.sources import data_files, sources_sha256

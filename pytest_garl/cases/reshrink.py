@@ -25,8 +25,8 @@ from pytest_garl.cases.robustness import NEIGHBOURS
 from pytest_garl.cases.shrink import shrink
 from pytest_garl.cases.simplification import complexity, genome_of
 from pytest_garl.cases.user_failure import UserAssertion
-from pytest_garl.execution.batch import temporary_pool
 from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.local_pool import temporary_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.reference import (
     BUILT_IN,

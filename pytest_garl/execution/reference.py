@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import LandingSystemError
-from pytest_garl.execution.flight_code import code_sha256, flight_code_sha256
+from pytest_garl.execution.sources import code_sha256, flight_code_sha256
 from pytest_garl.messages import shown
 
 SYSTEM_NAME = re.compile(r"\w[\w-]*(\.\w[\w-]*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")

@@ -9,10 +9,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 from pytest_garl.errors import BaselineError, PolicyError
-from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.checkout import Checkout, locate_system
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob, parse_job
+from pytest_garl.execution.local_pool import temporary_pool
+from pytest_garl.execution.on_demand import fly_all
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.execution.stored_ledger import checked_ledger
 from pytest_garl.gate.baseline_file import Baseline, BaselineFlight, BaselineSet

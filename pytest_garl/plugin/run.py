@@ -15,12 +15,12 @@ from pytest_garl.cases.known_kinds import Excuse, KnownCase, KnownKinds
 from pytest_garl.cases.reference_proofs import Proofs, proves_reference
 from pytest_garl.cases.replay import SourceHashes, stale_reasons
 from pytest_garl.errors import LedgerError
-from pytest_garl.execution.batch import fly_all
 from pytest_garl.execution.facts import Facts
-from pytest_garl.execution.first_violations import FirstViolations
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import FirstViolations
+from pytest_garl.execution.on_demand import fly_all
 from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import Reference, simulator_sha256
 from pytest_garl.execution.sources import combined_sha256

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import LedgerError
-from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.local_pool import temporary_pool
+from pytest_garl.execution.on_demand import fly_all
 from pytest_garl.execution.reference import Reference
 from pytest_garl.gate.record import BaselineSpec
 from pytest_garl.npcs.policy_catalogue import policy_spec

@@ -9,30 +9,30 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.execution import flight_code
-from pytest_garl.execution.flight_code import code_sha256, flown_modules
+from pytest_garl.execution import sources
 from pytest_garl.execution.reference import Reference, simulator_sha256
+from pytest_garl.execution.sources import code_sha256, flown_modules
 
 
 def fresh() -> str:
     """Hash this package; within a process that is done once."""
-    flight_code.flight_code_sha256.cache_clear()
-    return flight_code.flight_code_sha256()
+    sources.flight_code_sha256.cache_clear()
+    return sources.flight_code_sha256()
 
 
 @pytest.fixture
 def copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Return a copy of this package that is hashed in its place."""
-    home = Path(flight_code.__file__).parents[1]
+    home = Path(sources.__file__).parents[1]
     shutil.copytree(
         home, tmp_path / "pytest_garl", ignore=shutil.ignore_patterns("__pycache__", "*.npz")
     )
     here = fresh()
     assert re.fullmatch("[0-9a-f]{64}", here)
-    monkeypatch.setattr(flight_code, "_HOME", tmp_path / "pytest_garl")
+    monkeypatch.setattr(sources, "_HOME", tmp_path / "pytest_garl")
     assert fresh() == here
     yield tmp_path / "pytest_garl"
-    flight_code.flight_code_sha256.cache_clear()
+    sources.flight_code_sha256.cache_clear()
 
 
 def test_comments_docstrings_and_layout_do_not_matter(copy: Path) -> None:

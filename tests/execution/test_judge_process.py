@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from pytest_garl.errors import GarlError, NotFiniteError, PoolError
-from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.fly_and_judge import FlownJob, fly_and_save, fly_job, judged
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.local_pool import local_pool
+from pytest_garl.execution.local_pool import local_pool, temporary_pool
+from pytest_garl.execution.on_demand import fly_all
 from pytest_garl.execution.processes import alive, descendants_of
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.flight.flight import Flight

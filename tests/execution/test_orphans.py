@@ -16,7 +16,7 @@ from pytest_garl.execution.processes import alive, any_command_contains
 STARTS_A_WORKER = """
 import sys, time
 from pathlib import Path
-from pytest_garl.execution.process_pool import ProcessPool
+from pytest_garl.execution.local_pool import ProcessPool
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import FlightWorkers
 

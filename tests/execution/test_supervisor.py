@@ -14,9 +14,8 @@ from pytest_garl.errors import PoolError
 from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, Slot
 from pytest_garl.execution.fly_and_judge import fly_job
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.local_pool import FlightWorkers
+from pytest_garl.execution.local_pool import MAX_IDLE_EXITS, FlightWorkers, ProcessPool
 from pytest_garl.execution.pool import wait_for
-from pytest_garl.execution.process_pool import MAX_IDLE_EXITS, ProcessPool
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.supervisor import LEAST_STANDSTILL_S, FlightMonitor
@@ -227,7 +226,7 @@ def test_processes_started_in_a_flight_end_with_it(field: Field, undisturbed: st
 def test_stopped_supervisor_is_a_finding(
     field: Field, undisturbed: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pytest_garl.execution.process_pool.LEAST_SILENCE_S", 1.5)
+    monkeypatch.setattr("pytest_garl.execution.local_pool.LEAST_SILENCE_S", 1.5)
     flown = field.fly(StopsItsSupervisor, timeout_s=0.2)
     assert flown.signature == "V:hung:Timeout"
     stood_still = "the process that watches it stood still for 1.8 s of wall time, twice"

@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.local_pool import temporary_pool
+from pytest_garl.execution.on_demand import fly_all
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.processes import any_command_contains
 from pytest_garl.execution.reference import BUILT_IN

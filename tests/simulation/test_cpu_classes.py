@@ -17,8 +17,9 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.case_file import dump_case
 from pytest_garl.cases.corpus import Corpus
-from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.local_pool import temporary_pool
+from pytest_garl.execution.on_demand import fly_all
 from pytest_garl.execution.reference import Reference
 from pytest_garl.npcs.recorded import recorded_spec
 from pytest_garl.scenarios.maps.loading import load_map

@@ -16,9 +16,8 @@ from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
-from pytest_garl.execution.local_pool import FlightWorkers
+from pytest_garl.execution.local_pool import FlightWorkers, ProcessPool
 from pytest_garl.execution.pool import wait_for
-from pytest_garl.execution.process_pool import ProcessPool
 from pytest_garl.execution.ray.path_mapping import PathMapping
 from pytest_garl.execution.reference import package_sha256
 from pytest_garl.execution.result import FlightResult, broken_result

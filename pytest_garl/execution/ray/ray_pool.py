@@ -12,8 +12,8 @@ from pathlib import Path
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.ledger_queue import WorkQueue
+from pytest_garl.execution.local_pool import ProcessPool
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.process_pool import ProcessPool
 from pytest_garl.execution.worker_failure import WorkerExit
 
 INSTALL_COMMAND = "pip install 'pytest-garl[ray]'"
