@@ -24,6 +24,35 @@ REACH = {
     "pytest_garl.plugin.options": 53,
 }
 """Modules of the package that an import pulls in at most, those included that it imports late."""
+MOST_FILES = 28
+LARGER_ROOMS = {"pytest_garl/cases": 43, "pytest_garl/plugin": 48}
+"""Rooms with more files, and how many: the redesign of cases and of the plugin will fold them.
+A number here may only fall."""
+SHORT = 100
+KEPT_APART = {
+    "cases/escape_plan": "which escapes are tried; prevention decides when",
+    "cli/case_tables": "what the commands about cases show, apart from what they do",
+    "cli/film_command": "a command has a file of its own",
+    "cli/skeleton": "`garl init` copies the file",
+    "npcs/training/rewards": "formulae, named by their module where they are used",
+    "plugin/hookspecs": "pluggy reads a module",
+    "plugin/option_checks": "every pytest run loads the hooks, and few need the checks",
+    "plugin/option_values": "reads texts; options says which option is which",
+    "plugin/pages": "a run without pages does not load it",
+    "plugin/terminal_summary": "every pytest run loads the hooks, and few write a summary",
+    "reports/film/gif": "a format of files",
+    "reports/film/labels": "letters for any picture",
+    "reports/mcap/numbers": "the wire format of Protocol Buffers",
+    "reports/mcap/path_topics": "topics have a file for each subject",
+    "reports/mcap/state": "topics have a file for each subject",
+    "reports/mcap/transforms": "topics have a file for each subject",
+    "search/methods/garl_paper": "a search method has a file of its own",
+    "search/user_method": "every pytest run loads the catalogue, and few name such a method",
+    "simulation/physics/leap": "one way to move; npc chooses among them",
+    "simulation/physics/solids_ahead": "geometry of maps, which knows no NPC",
+    "verdicts/excuses": "its figures have reasons of their own; judge takes no part in them",
+}
+"""Short files with one importer, in the importer's room, and why they are no part of it."""
 
 
 @pytest.fixture(scope="module")
@@ -132,3 +161,26 @@ def test_no_two_modules_have_names_alike() -> None:
 )
 def test_names_are_alike_by_their_words(name: str, other: str, *, alike: bool) -> None:
     assert (meant(name) == meant(other)) is alike
+
+
+def test_rooms_have_few_files() -> None:
+    files = Counter(path.parent.relative_to(ROOT).as_posix() for path in sources("pytest_garl"))
+    larger = {room: count for room, count in files.items() if count > MOST_FILES}
+    over = {room: count for room, count in larger.items() if count > LARGER_ROOMS.get(room, 0)}
+    assert not over
+    assert sorted(larger) == sorted(LARGER_ROOMS), "these rooms need no exception any more"
+
+
+def test_a_short_file_with_one_importer_is_part_of_it_or_has_a_reason(
+    imports: grimp.ImportGraph,
+) -> None:
+    alone = []
+    for path in sources("pytest_garl"):
+        if path.stem in ("__init__", "__main__") or path.read_text().count("\n") >= SHORT:
+            continue
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        importers = imports.find_modules_that_directly_import(module)
+        rooms = [each.rpartition(".")[0] for each in importers]
+        if rooms == [module.rpartition(".")[0]]:
+            alone.append(path.relative_to(ROOT / "pytest_garl").with_suffix("").as_posix())
+    assert alone == sorted(KEPT_APART)

@@ -9,8 +9,8 @@ from typing import Any
 
 from pytest_garl.flight.flight import Crash, Flight, Outcome
 from pytest_garl.flight.landing_phases import LandingPhases
-from pytest_garl.flight.thresholds import up_m
-from pytest_garl.landing_system import Abort, Command, Land, VehicleState
+from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, GRAVITY_MPS2, up_m
+from pytest_garl.landing_system import Abort, Command, Land, VehicleState, VelocitySetpoint
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.projection import eye_under
@@ -28,6 +28,7 @@ from pytest_garl.simulation.physics.vehicle import (
     Quaternion,
     Thrusts,
     Vector,
+    VehicleModel,
     drag,
     lag,
     vehicle_model,
@@ -39,7 +40,6 @@ from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.rangefinder import Ranging
 from pytest_garl.simulation.recorder import Recorder
 from pytest_garl.simulation.sensors import Delivery, Sensors
-from pytest_garl.simulation.start import begin_at_start
 from pytest_garl.simulation.system_under_test.calls import StepGuard, SystemFailedError
 from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthObject
 from pytest_garl.simulation.system_under_test.mission import mission_for
@@ -312,3 +312,25 @@ def _is_finite(world: World) -> bool:
 def _ticks_per_call(rate_hz: float | None) -> int:
     """Return how many physics steps lie between two calls at a rate; 1 without one."""
     return max(1, round(PHYSICS_RATE_HZ / rate_hz)) if rate_hz else 1
+
+
+def begin_at_start(
+    world: World, model: VehicleModel, placed: Placed
+) -> tuple[Thrusts, Command | None]:
+    """Move the UAV to its start; return its thrusts, and the command until the system's first.
+
+    A UAV that hovers is level and at rest, and wind moves it until its control has learned the
+    wind.
+    """
+    yaw = math.radians(placed.scenario["heading.start_deg"])
+    attitude = (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+    x, y, height = placed.start_m
+    if placed.scenario.task.start.hovers:
+        world.place_uav((x, y, height), attitude)
+        each = model.mass_kg * GRAVITY_MPS2 / 4
+        return (each, each, each, each), VelocitySetpoint(
+            velocity_mps=(0.0, 0.0, 0.0), yaw_rad=None
+        )
+    if yaw:
+        world.place_uav((x, y, BODY_ABOVE_FEET_M), attitude)
+    return NO_THRUST, None

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 import platform
+import re
 import shutil
 import tempfile
 from dataclasses import dataclass
@@ -18,8 +20,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.local_pool import FlightWorkers, ProcessPool
 from pytest_garl.execution.pool import wait_for
-from pytest_garl.execution.ray.path_mapping import PathMapping
-from pytest_garl.execution.reference import package_sha256
+from pytest_garl.execution.reference import Reference, package_sha256
 from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.files.json_values import parse_json
@@ -27,6 +28,48 @@ from pytest_garl.flight.flight import PACKAGES, Crash
 
 _PLACEHOLDER_RESULT = broken_result(Crash(kind="died", error="", message=""), diagonal_m=0.0)
 """The entry in the actor's own ledger for a flight whose worker ended; nothing reads it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PathMapping:
+    """Two folders with the same project: ``local`` where pytest runs, ``remote`` on this node."""
+
+    local: str
+    remote: str
+
+    def remote_job(self, text: str) -> FlightJob:
+        """Return the job in ``text`` with the paths of this node.
+
+        Ray copies only the project.  Landing systems and simulators from outside it are imported
+        by their module's name, from where this node has them installed.
+        """
+        job = parse_job(
+            _replace_folder(text, _json_escaped(self.local), _json_escaped(self.remote))
+        )
+        return dataclasses.replace(
+            job,
+            system=self._importable_here(job.system),
+            simulator=self._importable_here(job.simulator),
+        )
+
+    def to_local(self, text: str) -> str:
+        """Return a text, such as a traceback, with the paths of the machine where pytest runs."""
+        return _replace_folder(text, self.remote, self.local)
+
+    def _importable_here(self, reference: Reference) -> Reference:
+        """Leave out the file of a reference from outside the project."""
+        if reference.file.startswith(f"{self.remote}/"):
+            return reference
+        return dataclasses.replace(reference, file="")
+
+
+def _json_escaped(path: str) -> str:
+    return json.dumps(path)[1:-1]
+
+
+def _replace_folder(text: str, old: str, new: str) -> str:
+    """Replace a folder if it is a whole path or the beginning of one."""
+    return re.sub(rf"(?<![\w.-]){re.escape(old)}(?![^/\"'\s])", lambda _: new, text)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

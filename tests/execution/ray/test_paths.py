@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.execution.ray.path_mapping import PathMapping
+from pytest_garl.execution.ray.actor import PathMapping
 from pytest_garl.execution.reference import Reference
 from pytest_garl.simulation.npc_policy import PolicySpec
 from tests.execution.flying import Good, job_of
