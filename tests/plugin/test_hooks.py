@@ -33,10 +33,14 @@ def test_each_violation_fails_one_item_and_xfails_its_duplicates(
     result.stdout.fnmatch_lines(["* IV:dog:* pytest test_it.py --garl-repeat=lawn-g*"])
 
 
-def test_the_same_seed_gives_the_same_results_for_any_workers(pytester: pytest.Pytester) -> None:
+def test_the_same_seed_gives_the_same_results_for_any_workers(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
     project(pytester)
     hashes = set()
     for args in (("0",), ("1",), ("4",), ("2", "-n2", "--dist=worksteal")):
+        # Nor does the order of sets change them.
+        monkeypatch.setenv("PYTHONHASHSEED", f"1{args[0]}")
         run(pytester, "--garl-budget=16", f"--garl-workers={args[0]}", *args[1:])
         hashes.add(result_hash(pytester))
     assert len(hashes) == 1

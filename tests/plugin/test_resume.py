@@ -18,6 +18,7 @@ import pytest
 from pytest_garl.npcs.learned import Network, save
 from pytest_garl.npcs.weights import WEIGHTS
 from tests.support.landing_project import project, result_hash, run
+from tests.support.warm_python import COLD
 
 SLOW = """
 import time
@@ -48,7 +49,8 @@ def start(pytester: pytest.Pytester, *args: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         command,
         cwd=pytester.path,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        # Cold: one test ends the children of the run.
+        env={**os.environ, **COLD, "PYTHONPATH": os.pathsep.join(sys.path)},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -1,47 +1,71 @@
 """Runs of pytest and of ``garl`` in processes of their own that need not import everything first.
 
 ``python -m pytest`` with this plugin imports for half a second, several hundred times in these
-tests.  A server imports once and forks a run for each command.  Such a run is a process of its own:
-its folder, environment, arguments and files are its own, and nothing of it reaches another run or a
-test.  It differs from a fresh interpreter in what was imported before and in the seed of hashes,
-which all runs of a server share.  A command whose environment differs in what an interpreter reads
-at its start, such as PYTHONHASHSEED, starts a fresh one.
+tests.  A server, which is this file as a script, imports once and forks a run for each command.
+Such a run is a process of its own: its folder, environment, arguments and files are its own, and
+nothing of it reaches another run or a test.  The server forks the workers of a run's xdist, too.
+
+A run differs from a fresh interpreter in what was imported before, in its parent, and in the seed
+of hashes, which all runs of a server share.  A command whose environment differs in what an
+interpreter reads at its start gets a fresh one: ``COLD`` is such a difference.
 """
 
 from __future__ import annotations
 
 import atexit
-import functools
+import gc
+import importlib
 import json
 import os
+import runpy
+import select
+import signal
 import socket
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from pkgutil import iter_modules
+from types import ModuleType
+from typing import Any, ClassVar, Self
 
-from pytest_garl import cpu_dispatch
-from tests.support.warm_server import LONGEST_REQUEST
-
+IMPORTED_LATE = (
+    "faulthandler",
+    "pdb",
+    "pybullet",
+    "pytest_garl.cli",
+    "pytest_garl.execution.on_demand",
+    "pytest_garl.reports.causes",
+    "pytest_garl.search.methods.garl",
+    "pytest_garl.search.methods.random",
+    "pytest_garl.simulation.environment",
+    "scipy.special",
+    "xdist.remote",
+)
+"""What a run imports after its start, beside the plugin's modules."""
 READ_AT_START = ("PYTHON", "LC_", "LANG")
 """How variables begin that an interpreter reads when it starts."""
+COLD = {"PYTHONHASHSEED": "random"}
+"""What the environment of a command has that must not be forked."""
 GARL = "from pytest_garl.cli import main"
+XDIST = ["-u", "-c", "import sys;exec(eval(sys.stdin.readline()))"]
+LONGEST_MESSAGE = 2**20
 
 
 class WarmPopen(subprocess.Popen[Any]):
     """``subprocess.Popen``, which has the server fork Python if that is to run pytest or garl."""
 
+    server: ClassVar[Server | None] = None
     _is_warm = False
 
     def _execute_child(self, *given: Any) -> None:
         """Start the command; the names are those of ``subprocess`` in Python 3.11."""
         args, executable, preexec_fn, _, pass_fds, cwd, env = given[:7]
-        p2cread, p2cwrite, c2pread, c2pwrite, errread, errwrite = given[10:16]
-        start_new_session = given[21]
+        files, start_new_session = given[10:16], given[21]
         environment = dict(os.environ if env is None else env)
         plain = not (executable or preexec_fn or pass_fds or start_new_session)
-        if not (plain and _imports_much(args) and _is_as_here(environment)):
+        if not (plain and _imports_much(args) and self._server().is_found_in(environment)):
             start: Any = super()
             start._execute_child(*given)
             return
@@ -50,47 +74,75 @@ class WarmPopen(subprocess.Popen[Any]):
             "folder": str(Path(cwd or ".").absolute()),
             "environment": environment,
         }
-        files = [
-            standard if file == -1 else file
-            for standard, file in enumerate((p2cread, c2pwrite, errwrite))
-        ]
+        p2cread, _, _, c2pwrite, _, errwrite = files
+        standard = enumerate((p2cread, c2pwrite, errwrite))
         self._is_warm = True
-        self.pid = _server().start(request, files)
+        self.pid = self._server().start(
+            request, [number if file == -1 else file for number, file in standard]
+        )
         self._child_created = True
         close: Any = self
-        close._close_pipe_fds(p2cread, p2cwrite, c2pread, c2pwrite, errread, errwrite)
+        close._close_pipe_fds(*files)
 
     def _try_wait(self, wait_flags: int) -> tuple[int, int]:
         if self._is_warm:
-            return _server().status_of(self.pid, wait_flags)
+            return self._server().status_of(self.pid, wait_flags)
         wait: Any = super()
         found: tuple[int, int] = wait._try_wait(wait_flags)
         return found
 
     def _internal_poll(self, *given: Any, **named: Any) -> int | None:
         if self._is_warm:
-            named["_waitpid"] = _server().status_of
+            named["_waitpid"] = self._server().status_of
         poll: Any = super()
         status: int | None = poll._internal_poll(*given, **named)
         return status
 
+    @classmethod
+    def _server(cls) -> Server:
+        if cls.server is None:
+            cls.server = Server.of_this_process()
+        return cls.server
 
-class _Server:
-    """The process that forks runs, and the connection to it."""
 
-    def __init__(self) -> None:
-        self.environment = dict(os.environ)
-        self._connection, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        script = Path(__file__).with_name("warm_server.py")
-        with other:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", str(script), str(other.fileno())],
+def _imports_much(command: Any) -> bool:
+    """Whether a command is Python that runs pytest, garl or a worker of xdist."""
+    if isinstance(command, str | bytes | os.PathLike) or command[0] != sys.executable:
+        return False
+    words = [os.fspath(each) for each in command[1:4]]
+    if words[0] == "-c":
+        return GARL in words[1]
+    return words[0] == "-mpytest" or words[:2] == ["-m", "pytest"] or words == XDIST
+
+
+class Server:
+    """A connection to the process that forks runs."""
+
+    def __init__(self, connection: socket.socket, environment: Mapping[str, str]) -> None:
+        self._connection = connection
+        self._read_at_start = _read_at_start(environment)
+        self._statuses: dict[int, int] = {}
+
+    @classmethod
+    def of_this_process(cls) -> Self:
+        """Start a server that ends with this process."""
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            process = subprocess.Popen(
+                [sys.executable, "-P", __file__, str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                pass_fds=[other.fileno()],
-                env={**self.environment, "PYTHONPATH": ""},
+                pass_fds=[theirs.fileno()],
+                env={**os.environ, "PYTHONPATH": ""},
             )
-        self._statuses: dict[int, int] = {}
+        # Reading its end waits for it, so that a test run's times include those of its runs.
+        atexit.register(process.wait)
+        atexit.register(ours.close)
+        return cls(ours, os.environ)
+
+    def is_found_in(self, environment: Mapping[str, str]) -> bool:
+        """Whether an interpreter would read from this environment what the server has read."""
+        return _read_at_start(environment) == self._read_at_start
 
     def start(self, request: Mapping[str, Any], files: Sequence[int]) -> int:
         """Fork a run with these files as 0, 1 and 2; return its process id."""
@@ -109,43 +161,151 @@ class _Server:
         return pid, self._statuses[pid]
 
     def _next_answer(self, flags: int = 0) -> dict[str, int]:
-        text = self._connection.recv(LONGEST_REQUEST, flags)
-        assert text, f"the server of warm runs has ended: {self._process.wait()}"
+        text = self._connection.recv(LONGEST_MESSAGE, flags)
+        assert text, "the server of warm runs has ended"
         answer: dict[str, int] = json.loads(text)
         if "ended" in answer:
             self._statuses[answer["ended"]] = answer["status"]
         return answer
 
-    def close(self) -> None:
-        """End the server and its runs."""
-        self._connection.close()
-        self._process.wait()
-
-
-@functools.cache
-def _server() -> _Server:
-    server = _Server()
-    atexit.register(server.close)
-    return server
-
-
-def _imports_much(command: Any) -> bool:
-    """Whether a command is Python that runs pytest or garl."""
-    if isinstance(command, str | bytes | os.PathLike) or command[0] != sys.executable:
-        return False
-    words = [os.fspath(each) for each in command[1:3]]
-    if words[0] == "-c":
-        return GARL in words[1]
-    return words[0] == "-mpytest" or words == ["-m", "pytest"]
-
-
-def _is_as_here(environment: Mapping[str, str]) -> bool:
-    """Whether a process would find in this environment what the server found at its start."""
-    return _read_at_start(environment) == _read_at_start(_server().environment)
-
 
 def _read_at_start(environment: Mapping[str, str]) -> dict[str, str]:
     """Return the variables that a process must have before it starts or imports NumPy."""
+    from pytest_garl import cpu_dispatch
+
     names = {name for name in environment if name.startswith(READ_AT_START)}
     names = (names | set(cpu_dispatch.environment())) - {"PYTHONPATH"}
     return {name: environment[name] for name in names if name in environment}
+
+
+def import_all() -> None:
+    """Import pytest, its plugins and pytest-garl as a run does: with rewritten assertions."""
+    from _pytest.config import _prepareconfig
+
+    with tempfile.TemporaryDirectory() as folder:
+        config = _prepareconfig(["-s", "-c", os.devnull, "--rootdir", folder, folder])
+        plugin = importlib.import_module("pytest_garl.plugin")
+        late = [f"{plugin.__name__}.{each.name}" for each in iter_modules(plugin.__path__)]
+        for name in [*late, *IMPORTED_LATE]:
+            importlib.import_module(name)
+        config._ensure_unconfigure()
+    gc.collect()
+    # A run need not look at what was made here whenever it collects.
+    gc.freeze()
+
+
+class Forks:
+    """What the server does: it forks a run for each request, and tells how each ends."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._first = connection
+        self._connections = [connection]
+        """To the process that started it, and to each run of xdist."""
+        self._runs: dict[int, socket.socket] = {}
+        self._woken, self._waker = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        signal.signal(signal.SIGCHLD, lambda number, frame: None)
+        signal.set_wakeup_fd(self._waker)
+
+    def serve(self) -> tuple[dict[str, Any], socket.socket] | None:
+        """Return a request and a connection to the server in its run, and None at the end here."""
+        while True:
+            files = [self._woken, *(each.fileno() for each in self._connections)]
+            ready, _, _ = select.select(files, [], [])
+            if self._woken in ready:
+                os.read(self._woken, LONGEST_MESSAGE)
+                self._reap()
+            for connection in list(self._connections):
+                if connection.fileno() not in ready:
+                    continue
+                text, files, _, _ = socket.recv_fds(connection, LONGEST_MESSAGE, 3)
+                if text and (theirs := self._fork(connection, files)):
+                    return json.loads(text), theirs
+                if not text:
+                    self._end(connection)
+                if self._first not in self._connections:
+                    return None
+
+    def _fork(self, connection: socket.socket, files: Sequence[int]) -> socket.socket | None:
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        pid = os.fork()
+        if pid == 0:
+            signal.set_wakeup_fd(-1)
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            for each in (ours, *self._connections):
+                each.close()
+            os.close(self._woken)
+            os.close(self._waker)
+            for number, file in enumerate(files):
+                os.dup2(file, number)
+                os.close(file)
+            return theirs
+        theirs.close()
+        for file in files:
+            os.close(file)
+        self._connections.append(ours)
+        self._runs[pid] = connection
+        connection.send(json.dumps({"started": pid}).encode())
+        return None
+
+    def _end(self, connection: socket.socket) -> None:
+        """End the runs that were started by a process which has ended."""
+        self._connections.remove(connection)
+        connection.close()
+        for pid, starter in self._runs.items():
+            if starter is connection:
+                os.kill(pid, signal.SIGKILL)
+
+    def _reap(self) -> None:
+        while self._runs:
+            pid, status = os.waitpid(-1, os.WNOHANG)
+            if not pid:
+                break
+            starter = self._runs.pop(pid)
+            if starter in self._connections:
+                starter.send(json.dumps({"ended": pid, "status": status}).encode())
+
+
+def run(request: dict[str, Any], path: list[str]) -> None:
+    """Run what Python with these arguments runs."""
+    os.chdir(request["folder"])
+    os.environ.clear()
+    os.environ.update(request["environment"])
+    tempfile.tempdir = None
+    sys.orig_argv[:] = request["command"]
+    words = [word for word in request["command"][1:] if word != "-u"]
+    option = words.pop(0)
+    if option == "-m":
+        option += words.pop(0)
+    name = option.removeprefix("-m")
+    first = "" if name == "-c" else request["folder"]
+    searched = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    sys.path[:] = [first, *filter(None, searched), *path]
+    importlib.invalidate_caches()
+    if name == "-c":
+        code = words.pop(0)
+        sys.argv[:] = ["-c", *words]
+        module = sys.modules["__main__"] = ModuleType("__main__")
+        exec(compile(code, "<string>", "exec"), module.__dict__)
+    else:
+        sys.argv[:] = ["-m", *words]
+        runpy.run_module(name, run_name="__main__", alter_sys=True)
+
+
+def main() -> None:
+    """Serve on the connection that the first argument names."""
+    import_all()
+    path = list(sys.path)
+    forked = Forks(socket.socket(fileno=int(sys.argv[1]))).serve()
+    if forked is None:
+        return
+    request, connection = forked
+    if any(word.startswith("-n") for word in request["command"]):
+        WarmPopen.server = Server(connection, os.environ)
+        vars(subprocess)["Popen"] = WarmPopen
+    else:
+        connection.close()
+    run(request, path)
+
+
+if __name__ == "__main__":
+    main()
