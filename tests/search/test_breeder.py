@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -38,9 +39,17 @@ def searched(path: Path, name: str, budget: int, wanted: tuple[Slot, ...] = ()) 
 
 
 # Two more fly the scenarios of random search, each with other objects.
+@pytest.mark.parametrize(
+    "budgets",
+    [
+        # A search of less than a population, and of one, two or three with some left over.
+        pytest.param((*range(1, 11), 15, 16, 17, 24, 30), id="some"),
+        pytest.param(range(1, 61), id="all", marks=pytest.mark.long),
+    ],
+)
 @pytest.mark.parametrize("name", sorted({*method_names()} - {"surrogate-random", "online-rl"}))
-def test_every_budget_is_flown_exactly(tmp_path: Path, name: str) -> None:
-    for budget in range(1, 61):
+def test_every_budget_is_flown_exactly(tmp_path: Path, name: str, budgets: Sequence[int]) -> None:
+    for budget in budgets:
         ledger = searched(tmp_path / f"{budget}.sqlite", name, budget)
         texts = [
             text
