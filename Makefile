@@ -5,6 +5,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 FLIES := $(VENV)/.flies
 READY := $(VENV)/.installed
+CLUSTERS := $(VENV)/.clusters
+CHECKS := $(VENV)/checks.log
 SMOKE := .garl/experiment-smoke
 
 # The tests start some thousand processes; without the compiled files each would parse the sources.
@@ -22,7 +24,12 @@ search: $(FLIES)  ## fly BUDGET scenarios (default 20) per landing system and ma
 	@$(BIN)/pytest --garl-budget=$(BUDGET) -o garl_cases=.garl/cases landing_systems/; \
 	status=$$?; test $$status -le 1 || exit $$status
 
-test: lint types layers tests  ## lint, types, layers and all tests
+# Types take a minute of one core, in which the tests that wait leave one; the output comes in one piece.
+test: $(READY)  ## lint, types, layers and all tests
+	@$(MAKE) --no-print-directory lint types layers >$(CHECKS) 2>&1 & checks=$$!; \
+	$(MAKE) --no-print-directory tests; tests=$$?; \
+	wait $$checks; checks=$$?; cat $(CHECKS); \
+	test $$tests = 0 && test $$checks = 0
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -41,7 +48,7 @@ tests: $(READY)
 test-long: $(READY)  ## the tutorial, 50 kills, 154 misbehaving systems, more fuzz: an hour
 	$(BIN)/pytest -n 2 --dist=worksteal -m long tests
 
-test-ray: $(READY)  ## the tests that start Ray clusters: minutes, so not part of `test`
+test-ray: $(CLUSTERS)  ## the tests that start Ray clusters: minutes, so not part of `test`
 	$(BIN)/pytest -m ray tests
 
 bench: $(READY)  ## measure frames, flights and the plugin's overhead
@@ -67,4 +74,9 @@ $(FLIES): pyproject.toml constraints.txt
 
 $(READY): $(FLIES)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,train]'
+	touch $@
+
+# Only the tests of clusters need Ray.
+$(CLUSTERS): $(READY)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,train,ray]'
 	touch $@

@@ -235,6 +235,7 @@ def test_error_without_ray_says_how_to_install_it(pytester: pytest.Pytester) -> 
     assert not (pytester.path / ".garl").exists()
 
 
+@pytest.mark.ray
 @pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="needs pytest-garl[ray]")
 def test_missing_cluster_is_one_clear_error(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
