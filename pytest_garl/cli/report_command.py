@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -13,8 +12,9 @@ from pytest_garl.cli.shared import FOLDER
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.messages import printable
 from pytest_garl.reports.html import MOST_FILMS
-from pytest_garl.reports.run_report import run_report_as_json
-from pytest_garl.reports.shares_text import PAPER_DEFINITION, in_control_text
+from pytest_garl.reports.run_json import run_as_json
+from pytest_garl.reports.run_reading import read_run
+from pytest_garl.reports.run_text import run_text
 
 
 @click.command()
@@ -70,14 +70,14 @@ def report(
     if out is not None and not as_json:
         _write_pages(ledger, out, corpus, films, workers)
         return
-    found = run_report_as_json(ledger, corpus)
-    _tell(json.dumps(found, indent=2) + "\n" if as_json else _text(found), out)
+    run = read_run(ledger, corpus)
+    _tell(json.dumps(run_as_json(run), indent=2) + "\n" if as_json else run_text(run), out)
 
 
 def _compare(ledger: Path, later: Path, as_json: bool, out: Path | None, corpus: Corpus) -> None:
     from pytest_garl.reports.run_comparison import compare_runs, comparison_text
 
-    found = compare_runs(run_report_as_json(ledger, corpus), run_report_as_json(later, corpus))
+    found = compare_runs(read_run(ledger, corpus), read_run(later, corpus))
     if as_json:
         _tell(json.dumps(found.to_json(), indent=2) + "\n", out)
     elif out is None:
@@ -96,43 +96,12 @@ def _tell(text: str, out: Path | None) -> None:
 
 
 def _write_pages(ledger: Path, out: Path, corpus: Corpus, films: int, workers: int | None) -> None:
+    from pytest_garl.reports.html.folder import check_target
     from pytest_garl.reports.html.report import write_html_report
 
-    written = write_html_report(ledger, out, corpus, films=films, workers=workers)
+    check_target(out)
+    run = read_run(ledger, corpus, checked=True)
+    written = write_html_report(run, out, films=films, workers=workers)
     for note in written.notes:
         click.echo(printable(f"garl: {note}"), err=True)
     click.echo(printable(f"{written.index}: {written.pages} pages, {written.films} films"))
-
-
-def _counts(counts: dict[str, int]) -> str:
-    return ", ".join(f"{name} {count}" for name, count in counts.items())
-
-
-def _text(found: dict[str, Any]) -> str:
-    lines = []
-    for search in found["searches"]:
-        name = search["system"].split(":")[-1]
-        late = search["not_landed"]
-        lines.append(
-            f"{name} on {search['map']}: {search['flown']} of {search['wanted']} flown, "
-            f"{search['landed']} landed, {search['violating']} violate "
-            f"({search['violating_by_the_paper']} {PAPER_DEFINITION}), "
-            f"gave up: {_counts(search['gave_up'])}"
-            f"{f'; ran out of time: {_counts(late)}' if any(late.values()) else ''}"
-        )
-        control = search["control"]
-        if control:
-            lines.append(f"  {control['text']}")
-        for kind in search["signatures"]:
-            severity = kind["severity"] or {}
-            unusual = severity.get("text", "")
-            least = "at the least" if severity.get("took") else "unusual in the mildest of them"
-            seen = in_control_text(
-                kind["in_control"], control["random"]["flights"] if control else 0
-            )
-            title, *ending = [*filter(None, (kind["title"], kind["headline"]))] or [""]
-            lines.append(f"  {kind['count']:4d}  {kind['signature']}: {title}")
-            lines += [f"        {text}" for text in ending]
-            lines += [f"        {least}: {unusual}"] if unusual else []
-            lines += [f"        {text}" for text in (seen, kind["repeat"]) if text]
-    return "\n".join([*lines, ""]) if lines else "no flights yet\n"

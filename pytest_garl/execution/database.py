@@ -17,8 +17,9 @@ REMEDY = (
     "Is it a ledger, is there space, may it be written? Fix that and go on with --garl-resume, or "
     "choose another folder with the ini key garl_dir"
 )
-VERSION = 7
-"""Version of the tables below; a ledger of another version cannot be resumed."""
+VERSION = 8
+"""Version of the tables below and of the facts in them; a ledger of another version cannot be
+resumed."""
 SCHEMA = """
 CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE search (

@@ -9,21 +9,66 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pytest_garl.airframe import Camera
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import Database
-from pytest_garl.files.json_values import parse_json
+from pytest_garl.files.json_values import dataclass_from, parse_json
 
+T = TypeVar("T")
 _SESSION = "session "
 """Begins the keys of facts that hold for one session of pytest; a resumed run forgets them."""
 _TWIN = "twin "
+_SEARCH = "search "
+_USER_FAILURES = "own failures"
 _VERSION, _SOURCES = "version", "sources of pytest-garl"
 _REPORTED = ("seed", "budget", "method", "population", "domain", "npcs", "python")
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True, order=True)
+class SearchKey:
+    """A landing system on a map, the domain of its scenarios, and the tests that judge its flights.
+
+    ``tests`` are node ids with their parameters but the slot.  A repeated scenario has no domain,
+    and a search that no test asked for has neither.
+    """
+
+    system: str
+    map: str
+    domain: str = ""
+    tests: tuple[str, ...] = ()
+
+    @property
+    def class_name(self) -> str:
+        """The name of the landing system's class."""
+        return self.system.split(":")[-1]
+
+    @property
+    def place(self) -> str:
+        """The name of a search that is the only one of its landing system on its map."""
+        return f"{self.class_name} on {self.map}"
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files of the tests."""
+        return tuple(sorted({test.partition("::")[0] for test in self.tests}))
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class UserFailure:
+    """A failed assertion about a user's own property, in the flight of a slot.
+
+    ``search`` is the key of its search in the ledger.
+    """
+
+    search: str
+    slot: str
+    signature: str
+    message: str
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -132,21 +177,28 @@ class Facts:
         """How many flights of searches the selected tests want."""
         return int(self._get("selected flights") or 0)
 
-    def note_files(self, system: str, map: str, files: Iterable[str]) -> None:
-        """Note which test files fly a system on a map."""
-        self._set(f"files of {system} on {map}", " ".join(sorted(files)))
+    def note_search(self, search: str, key: SearchKey) -> None:
+        """Note what identifies a search to people: by its key in the ledger nobody knows it."""
+        self._set(f"{_SEARCH}{search}", dataclasses.asdict(key))
 
-    def files(self, system: str, map: str) -> tuple[str, ...]:
-        """Return the test files that fly a system on a map."""
-        return tuple(str(self._get(f"files of {system} on {map}") or "").split())
+    @property
+    def searches(self) -> dict[str, SearchKey]:
+        """What identifies each search that tests asked for, by its key in the ledger."""
+        rows = self.database.execute(
+            "SELECT key FROM run WHERE substr(key, 1, ?) = ? ORDER BY key",
+            (len(_SEARCH), _SEARCH),
+        )
+        return {
+            key.removeprefix(_SEARCH): self._typed(SearchKey, key, self._get(key))
+            for (key,) in rows
+        }
 
-    def note_domains(self, system: str, map: str, labels: Iterable[str]) -> None:
-        """Note in which domains, too, a system is flown on a map."""
-        self._set(_domains(system, map), sorted({*self.domains(system, map), *labels}))
-
-    def domains(self, system: str, map: str) -> tuple[str, ...]:
-        """Return the domains in which a system is flown on a map."""
-        return tuple(self._get(_domains(system, map)) or ())
+    @property
+    def search_names(self) -> dict[str, str]:
+        """What texts call each of these searches."""
+        searches = self.searches
+        names = search_names(searches.values())
+        return {search: names[key] for search, key in searches.items()}
 
     def note_camera(self, system: str, camera: Camera) -> None:
         """Note the camera of a landing system, so that a report can draw its frames again."""
@@ -182,15 +234,16 @@ class Facts:
         """Return (signature, trajectory's hash) of each probe that a system violates."""
         return [(str(a), str(b)) for a, b in self._get(f"violated probes of {search}") or ()]
 
-    def note_user_failures(self, failures: Sequence[Mapping[str, Any]]) -> None:
+    def note_user_failures(self, failures: Iterable[UserFailure]) -> None:
         """Note the failed assertions about users' own properties."""
-        self._set("own failures", [dict(each) for each in failures])
+        self._set(_USER_FAILURES, [dataclasses.asdict(each) for each in failures])
 
     @property
-    def user_failures(self) -> Sequence[Mapping[str, Any]]:
+    def user_failures(self) -> list[UserFailure]:
         """The failed assertions about users' own properties."""
-        found: Sequence[Mapping[str, Any]] = self._get("own failures") or ()
-        return found
+        return [
+            self._typed(UserFailure, _USER_FAILURES, e) for e in self._get(_USER_FAILURES) or ()
+        ]
 
     # Of a session: a resumed run forgets them, because its tests run again.
 
@@ -242,6 +295,12 @@ class Facts:
         self.database.execute("INSERT OR IGNORE INTO run VALUES (?, ?)", (key, json.dumps(value)))
         return self._get(key)
 
+    def _typed(self, kind: type[T], key: str, value: Any) -> T:
+        try:
+            return dataclass_from(kind, value)
+        except ValueError as error:
+            raise self._damaged(key, error) from error
+
     def _text(self, key: str) -> str | None:
         found = self._get(key)
         return None if found is None else str(found)
@@ -251,11 +310,10 @@ class Facts:
         try:
             return None if row is None else parse_json(row[0])
         except ValueError as error:
-            raise LedgerError(f"{self.path}: the fact {key!r} is damaged: {error}") from error
+            raise self._damaged(key, error) from error
 
-
-def _domains(system: str, map: str) -> str:
-    return f"domains of {system} on {map}"
+    def _damaged(self, key: str, error: ValueError) -> LedgerError:
+        return LedgerError(f"{self.path}: the fact {key!r} is damaged: {error}")
 
 
 def _failure(key: str) -> str:
@@ -264,3 +322,30 @@ def _failure(key: str) -> str:
 
 def _in_utc(at: datetime | None) -> str:
     return (at or datetime.now(UTC)).isoformat(timespec="seconds")
+
+
+_PARTS: tuple[Callable[[SearchKey], str], ...] = (
+    lambda key: key.system.partition(":")[0],
+    lambda key: f"domain {key.domain}" if key.domain else "no domain",
+    lambda key: ", ".join(key.files),
+    lambda key: ", ".join(key.tests),
+)
+"""What tells searches apart, the shortest text first."""
+
+
+def search_names(keys: Iterable[SearchKey]) -> dict[SearchKey, str]:
+    """Return what texts call each of the searches of a run.
+
+    That is ``System on map``, and for searches that share it what tells them apart:
+    ``System on map (domain calm)``.
+    """
+    names = {key: key.place for key in keys}
+    for part in _PARTS:
+        told: dict[str, set[str]] = {}
+        for key, name in names.items():
+            told.setdefault(name, set()).add(part(key))
+        names = {
+            key: f"{name} ({part(key)})" if len(told[name]) > 1 else name
+            for key, name in names.items()
+        }
+    return names

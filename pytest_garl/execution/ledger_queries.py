@@ -24,6 +24,7 @@ _ADDRESS = re.compile(r"0x[0-9a-f]+")
 class SearchProgress:
     """How far a search is: slots flown, all slots, and the latest generation."""
 
+    search: str
     system: str
     map: str
     flown: int
@@ -73,14 +74,21 @@ class LedgerQueries:
     def progress(self) -> list[SearchProgress]:
         """Return how far each search is."""
         rows = self._database.execute(
-            "SELECT system, map, coalesce(sum(state = 'flown'), 0), wanted, "
+            "SELECT search.id, system, map, coalesce(sum(state = 'flown'), 0), wanted, "
             "coalesce(max(generation), 0) FROM search "
             "LEFT JOIN slot ON search.id = slot.search WHERE kind = 'search' "
-            "GROUP BY search.id ORDER BY system, map"
+            "GROUP BY search.id ORDER BY system, map, search.id"
         )
         return [
-            SearchProgress(system=system, map=map, flown=flown, total=wanted, generation=generation)
-            for system, map, flown, wanted, generation in rows
+            SearchProgress(
+                search=search,
+                system=system,
+                map=map,
+                flown=flown,
+                total=wanted,
+                generation=generation,
+            )
+            for search, system, map, flown, wanted, generation in rows
         ]
 
     def flights(self, search: str = "") -> list[LedgerFlight]:
@@ -147,7 +155,7 @@ class LedgerQueries:
         rows = self._database.execute(
             "SELECT search, map, generation, slot, system, scenario, result, sha256 FROM slot "
             f"JOIN search ON search.id = slot.search WHERE kind IN ({kinds}) AND state = 'flown' "
-            f"AND {condition} ORDER BY kind DESC, system, map, generation, slot",
+            f"AND {condition} ORDER BY kind DESC, system, map, generation, slot, search",
             values,
         )
         return [
@@ -248,7 +256,7 @@ class LedgerQueries:
         rows = self._database.execute(
             "SELECT system, map, generation, slot, scenario, result, objectives, sha256 FROM slot "
             "JOIN search ON search.id = slot.search WHERE kind = 'search' AND ? IN ('', search.id) "
-            "ORDER BY system, map, generation, slot",
+            "ORDER BY system, map, generation, slot, search",
             (search,),
         )
         for row in rows:

@@ -116,9 +116,9 @@ def _kinds(run: Run, tally: Tally) -> list[_Failure]:
     """Return the first flight of each kind of violation, the most frequent kinds first."""
     found = [
         (-kind.count, index, _Failure(key=key, name=kind.first, flight=search.flight(kind.first)))
-        for index, search in enumerate(tally.search_summaries(run.ledger))
+        for index, search in enumerate(tally.run_record(run).searches)
         for kind in search.kinds
-        for key in [(search.system, search.map, kind.signature)]
+        for key in [(search.name, kind.signature)]
     ]
     return [failure for *_, failure in sorted(found, key=lambda each: each[:2])]
 

@@ -15,8 +15,8 @@ from pytest_garl.plugin.suggested_commands import repeat_kind_command
 from pytest_garl.plugin.summary import renewal_lines
 from pytest_garl.reports.html.index_markdown import index_parts, page_link
 from pytest_garl.reports.markdown import code, escaped, table
-from pytest_garl.reports.search_summary import WHY_NO_LANDING, SearchSummary, ViolationKind
-from pytest_garl.reports.shares_text import PAPER_DEFINITION, kinds_lines, percent
+from pytest_garl.reports.run_record import WHY_NO_LANDING, KindRecord, RunRecord, SearchRecord
+from pytest_garl.reports.run_text import PAPER_DEFINITION, kinds_lines, percent
 
 if TYPE_CHECKING:
     from pytest_garl.reports.html.report import WrittenReport
@@ -51,7 +51,7 @@ Row = tuple[str, ...]
 
 
 def write_step_summary(
-    reporter: Any, run: Run, searches: Sequence[SearchSummary], report: WrittenReport | None
+    reporter: Any, run: Run, record: RunRecord, report: WrittenReport | None
 ) -> None:
     """Append the shares, the kinds of violation and the failed cases, if GitHub names a file.
 
@@ -60,26 +60,27 @@ def write_step_summary(
     if not os.environ.get(VARIABLE):
         return
     url = run.options.report_url
-    pages = {(kind.where, kind.signature): kind for kind in report.page.kinds} if report else {}
+    shown = report.page.kinds if report else ()
+    pages = {(row.page.where, row.kind.signature): row for row in shown}
     rows: list[Row] = [
         (
-            escaped(_where(search)),
+            escaped(search.name),
             escaped(kind.signature),
             escaped(_flights(search, kind)),
             escaped("; ".join(filter(None, (kind.title, kind.headline)))),
             escaped(kind.least),
             code(repeat_kind_command(search, kind, reporter.config)),
-            _link(pages.get((_where(search), kind.signature)), report, url),
+            _link(pages.get((search.name, kind.signature)), report, url),
         )
-        for search in searches
+        for search in record.searches
         for kind in search.kinds
     ]
     rows += _failed_cases(reporter)
-    flown = sum(len(search.verdicts) for search in searches)
+    searches = record.searches
     parts = [table(SHARES, [_shares(search) for search in searches])] if searches else []
-    none = f"No violation{f' in {flown} flights' if flown else ''}."
+    none = f"No violation{f' in {record.flown} flights' if record.flown else ''}."
     parts += [
-        escaped(f"{_where(search)}: {line}") for search in searches for line in kinds_lines(search)
+        escaped(f"{search.name}: {line}") for search in searches for line in kinds_lines(search)
     ]
     parts.append(_kinds_table(rows) if rows else none)
     parts += [*_failed_beside(reporter), *renewal_lines(reporter)]
@@ -116,30 +117,26 @@ def _link(kind: KindRow | None, report: WrittenReport | None, url: str) -> str:
     return page_link(kind, report.index.parent, url) if kind and report else ""
 
 
-def _where(search: SearchSummary) -> str:
-    return f"{search.name} on {search.map}"
-
-
-def _flights(search: SearchSummary, kind: ViolationKind) -> str:
+def _flights(search: SearchRecord, kind: KindRecord) -> str:
     """Return the number of flights of a kind and, with a control arm, of the random ones."""
     if kind.in_control is None:
         return str(kind.count)
     return f"{kind.count} ({kind.in_control} of {search.random_flights} random)"
 
 
-def _shares(search: SearchSummary) -> tuple[str, ...]:
+def _shares(search: SearchRecord) -> tuple[str, ...]:
     """Return the shares of a search, a cell for each of ``SHARES``."""
-    total, gave_up = len(search.flights), search.without_landing("gave_up")
     counts = [
-        search.count("landed"),
+        search.landed,
         search.violating,
         search.violating_by_the_paper,
-        *(gave_up[reason] for reason in WHY_NO_LANDING),
-        search.count("not_landed"),
+        *(search.gave_up[reason] for reason in WHY_NO_LANDING),
+        search.outcomes["not_landed"],
         sum(search.crashes.values()),
-        search.count("inconclusive"),
+        len(search.inconclusive),
     ]
-    return escaped(_where(search)), str(total), *(percent(count, total) for count in counts)
+    shares = (percent(count, search.flown) for count in counts)
+    return escaped(search.name), str(search.flown), *shares
 
 
 def _failed_beside(reporter: Any) -> list[str]:

@@ -13,7 +13,7 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import counted, duration
 from pytest_garl.plugin.time_left import FIRST_FLIGHTS
-from pytest_garl.reports.shares_text import limits_text
+from pytest_garl.reports.run_text import limits_text
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
 _DEFAULT_LEDGER = ".garl/ledger.sqlite"

@@ -207,7 +207,8 @@ class _Writer:
         writes that output if the ini key ``junit_logging`` asks for it.
         """
         config, target = self.item.config, self.target
-        file = folder / page_address(page_name(target.system_name, target.map, signature))
+        name = self.run.search_names[target.search]
+        file = folder / page_address(page_name(target.system_name, target.map, name, signature))
         url = self.run.options.report_url
         shown = os.path.relpath(file, config.rootpath)
         address = f"{url}/{file.relative_to(folder).as_posix()}" if url else shown
@@ -219,7 +220,7 @@ class _Writer:
         """Note a failure of the user's own property for the summary, whatever its outcome is."""
         target, failed = self.target, failure.failed_assertion
         if failure.user_property and failed is not None:
-            slot = [target.system_name, target.map, target.name]
+            slot = [target.search, target.name]
             self._note(USER_FAILURE, json.dumps([*slot, failure.signature, failed.message]))
 
     def _note_finding_test(self, failure: ItemFailure) -> None:

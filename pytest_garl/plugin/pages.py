@@ -12,9 +12,10 @@ from pytest_garl.plugin.terminal_text import counted, width_of, wrapped
 
 if TYPE_CHECKING:
     from pytest_garl.reports.html.report import WrittenReport
+    from pytest_garl.reports.run_record import RunRecord
 
 
-def write_pages(reporter: Any, run: Run) -> WrittenReport | None:
+def write_pages(reporter: Any, run: Run, record: RunRecord) -> WrittenReport | None:
     """Write the report of the run, and say where it is, or in one line why there is none."""
     options = run.options
     if options.report is None or not options.searches_or_repeats:
@@ -24,9 +25,7 @@ def write_pages(reporter: Any, run: Run) -> WrittenReport | None:
     width = width_of(reporter.config)
     reporter.section("garl: report", sep="=")
     try:
-        written = write_html_report(
-            run.ledger.path, options.report, run.corpus, workers=options.workers or None
-        )
+        written = write_html_report(record, options.report, workers=options.workers or None)
     except GarlError as error:
         reporter.write_line(wrapped(f"garl: {printable(str(error))}", width), red=True)
         return None

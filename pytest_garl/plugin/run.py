@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -15,7 +15,7 @@ from pytest_garl.cases.known_kinds import Excuse, KnownCase, KnownKinds
 from pytest_garl.cases.reference_proofs import Proofs, proves_reference
 from pytest_garl.cases.replay import SourceHashes, stale_reasons
 from pytest_garl.errors import LedgerError
-from pytest_garl.execution.facts import Facts
+from pytest_garl.execution.facts import Facts, SearchKey
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
@@ -44,7 +44,7 @@ REFLIGHTS = 4
 """A violation of a system that need not be deterministic is flown so many times more."""
 NOTHING_KNOWN = Excuse(known=None)
 FilmKey = tuple[str, ...]
-"""What a film shows: (system, map, signature) of a kind, or (name,) of a saved case."""
+"""What a film shows: (name of its search, signature) of a kind, or (name,) of a saved case."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,9 +116,9 @@ class Films:
     files: Mapping[FilmKey, Path] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    def of_search(self, system: str, map: str) -> dict[str, Path]:
+    def of_search(self, name: str) -> dict[str, Path]:
         """Return the films of a search by signature."""
-        return {key[2]: path for key, path in self.files.items() if key[:2] == (system, map)}
+        return {key[1]: path for key, path in self.files.items() if key[:-1] == (name,)}
 
     @property
     def of_cases(self) -> dict[str, Path]:
@@ -185,27 +185,20 @@ class Run:
 
         Raises LedgerError if a search to resume flew something else.
         """
-        files: dict[tuple[str, str], set[str]] = {}
-        domains: dict[tuple[str, str], set[str]] = {}
+        searched: dict[str, tuple[Target, set[str]]] = {}
         for item in items:
             target = target_of(item)
             if target is not None:
                 self.searches.select(target)
-                self.items.setdefault(target.flight, []).append(selected(item))
-                place = target.system_name, target.map
-                files.setdefault(place, set()).add(item.nodeid.partition("::")[0])
-                if target.is_searched and target.domain and not self.options.repeat:
-                    domains.setdefault(place, set()).add(target.domain.label)
+                one = selected(item)
+                self.items.setdefault(target.flight, []).append(one)
+                if target.entry is None:
+                    searched.setdefault(target.search, (target, set()))[1].add(one.test)
         # xdist's controller, which writes the summary and the progress line, has no items.
         facts = self.ledger.facts
-        for (system, map), names in files.items():
-            facts.note_files(system, map, names)
-        for (system, map), labels in domains.items():
-            _note_domains(facts, system, map, labels, resumed=self.options.resume)
+        _note_searches(facts, searched.values(), self.options)
         _note_cameras(facts, items)
-        wanted = self.searches.targets.values()
-        searched = [slots for slots in wanted if not any(each.entry for each in slots.values())]
-        self.search_sizes = [len(slots) for slots in searched]
+        self.search_sizes = [len(self.searches.targets[search]) for search in searched]
         if searched:
             facts.note_selected(sum(self.search_sizes))
         if self.options.resume:
@@ -231,6 +224,11 @@ class Run:
         if self.investigations is not None:
             self.investigations.close()
         self.pool.close()
+
+    @functools.cached_property
+    def search_names(self) -> dict[str, str]:
+        """What texts call each selected search, by its key in the ledger."""
+        return self.ledger.facts.search_names
 
     @functools.cached_property
     def claims(self) -> ReportClaims:
@@ -445,12 +443,21 @@ def _note_cameras(facts: Facts, items: Sequence[pytest.Item]) -> None:
             facts.note_camera(name, target.airframe.camera)
 
 
-def _note_domains(facts: Facts, system: str, map: str, wanted: set[str], *, resumed: bool) -> None:
-    """Note in which domains a system is flown on a map; a resumed run has the same ones."""
-    known = facts.domains(system, map)
-    if resumed and known and not wanted <= {*known}:
-        raise LedgerError(
-            f"--garl-resume: the domain of {system} on {map} was {' and '.join(known)}, is "
-            f"{' and '.join(sorted(wanted))}; run without --garl-resume to begin anew"
+def _note_searches(
+    facts: Facts, searched: Iterable[tuple[Target, Iterable[str]]], options: Options
+) -> None:
+    """Note what identifies the selected searches; a resumed run has no search in another domain."""
+    known = [key for key in facts.searches.values() if key.domain]
+    for target, tests in searched:
+        domain = "" if options.repeat or target.domain is None else target.domain.label
+        key = SearchKey(
+            system=target.system_name, map=target.map, domain=domain, tests=tuple(sorted(tests))
         )
-    facts.note_domains(system, map, wanted)
+        then = {each.domain for each in known if (each.system, each.map) == (key.system, key.map)}
+        if options.resume and domain and then and domain not in then:
+            raise LedgerError(
+                f"--garl-resume: the domain of {key.system} on {key.map} was "
+                f"{' and '.join(sorted(then))}, is {domain}; run without --garl-resume to begin "
+                "anew"
+            )
+        facts.note_search(target.search, key)

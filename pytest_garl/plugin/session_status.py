@@ -18,7 +18,7 @@ from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import counted
-from pytest_garl.reports.search_summary import SearchSummary
+from pytest_garl.reports.run_record import SearchRecord
 
 FLIGHTS_PER_EXCEPTION = 20
 """One in so many flights of a search may be inconclusive, and one may fail without repeating it."""
@@ -111,7 +111,7 @@ def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
             f"was skipped, passed or was expected to fail): {_names(excused)}"
         )
     if run is not None and run.options.searches_or_repeats:
-        searches = tally.search_summaries(run.ledger)
+        searches = tally.run_record(run).searches
         yield from _inconclusive(searches)
         yield from _unrepeated(tally, searches)
         if not run.options.repeat:
@@ -128,9 +128,9 @@ def notes(tally: Tally) -> Iterator[str]:
     if tally.items and not tally.flown and not tally.gated:
         yield f"nothing was flown: {_why_nothing_flew(tally)}"
     yield from _hidden(tally)
-    for search in tally.without_landing:
-        flights = counted(len(search.flights), "flight")
-        yield f"{search.name} on {search.map}: landed in none of {flights}"
+    for search in tally.record.searches if tally.record else ():
+        if not search.landed:
+            yield f"{search.name}: landed in none of {counted(search.flown, 'flight')}"
     for (system, map), slots in sorted(_unrepeated_by_search(tally).items()):
         violations = counted(len(slots), "violation")
         yield f"{_search(system, map)}: {violations} did not repeat: {_names(slots)}"
@@ -164,33 +164,32 @@ def _why_nothing_flew(tally: Tally) -> str:
     return "; ".join(reasons) or "all landing tests were skipped before they asked for a landing"
 
 
-def _inconclusive(searches: Sequence[SearchSummary]) -> Iterator[str]:
+def _inconclusive(searches: Sequence[SearchRecord]) -> Iterator[str]:
     """Yield which searches have too many inconclusive flights."""
     for search in searches:
-        slots = [each.id.slot_id for each in search.flights if each.result.inconclusive]
-        flown = len(search.flights)
+        slots, flown = search.inconclusive, search.flown
         allowed = flown // FLIGHTS_PER_EXCEPTION
         if len(slots) > allowed:
             yield (
-                f"{search.name} on {search.map}: {len(slots)} of {flown} flights are inconclusive, "
+                f"{search.name}: {len(slots)} of {flown} flights are inconclusive, "
                 f"at most {allowed} may be: {_names(slots)}. Fly them while the machine has "
                 "nothing else to do, or allow more time with --garl-timeout"
             )
 
 
-def _without_landing(searches: Sequence[SearchSummary]) -> Iterator[str]:
+def _without_landing(searches: Sequence[SearchRecord]) -> Iterator[str]:
     """Yield in which searches no flight landed within the limits, whatever is known of them."""
     for search in searches:
-        if not any(each.completed and not each.violation for each in search.verdicts):
+        if not search.completed_well:
             yield (
-                f"{search.name} on {search.map}: landed within the limits in none of "
-                f"{counted(len(search.flights), 'flight')}, so nothing shows that it can land"
+                f"{search.name}: landed within the limits in none of "
+                f"{counted(search.flown, 'flight')}, so nothing shows that it can land"
             )
 
 
-def _unrepeated(tally: Tally, searches: Sequence[SearchSummary]) -> Iterator[str]:
+def _unrepeated(tally: Tally, searches: Sequence[SearchRecord]) -> Iterator[str]:
     """Yield which searches have too many violations that did not repeat."""
-    flown = {(search.system, search.map): len(search.flights) for search in searches}
+    flown = {(search.key.system, search.key.map): search.flown for search in searches}
     for (system, map), slots in _unrepeated_by_search(tally).items():
         flights = flown.get((system, map), 0)
         allowed = max(1, flights // FLIGHTS_PER_EXCEPTION)

@@ -13,7 +13,7 @@ from pytest_garl.messages import command, printable
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.target import Target
-    from pytest_garl.reports.search_summary import SearchSummary, ViolationKind
+    from pytest_garl.reports.run_record import KindRecord, SearchRecord
 
 _FOLDERS = ("garl_dir", "garl_cases")
 
@@ -51,7 +51,7 @@ def shown_path(path: Path, config: pytest.Config) -> str:
     return printable(str(found), keep="")
 
 
-def repeat_kind_command(search: SearchSummary, kind: ViolationKind, config: pytest.Config) -> str:
+def repeat_kind_command(search: SearchRecord, kind: KindRecord, config: pytest.Config) -> str:
     """Return the command that repeats the first flight of a kind."""
-    files = [shown_path(config.rootpath / file, config) for file in search.files]
+    files = [shown_path(config.rootpath / file, config) for file in search.key.files]
     return repeat_command(config, files, kind.first)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -16,17 +15,19 @@ from pytest_garl.plugin.failure_films import film_lines
 from pytest_garl.plugin.header import cpu_dispatch_warning
 from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, OUTSIDE, RENEWABLE, STALE
 from pytest_garl.plugin.landing import NOT_JUDGED
+from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.save_cases import saved_lines
 from pytest_garl.plugin.session_status import notes
 from pytest_garl.plugin.suggested_commands import repeat_kind_command, shown_path
 from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import counted, width_of, wrapped
-from pytest_garl.reports.search_summary import SearchSummary, ViolationKind, legend
-from pytest_garl.reports.shares_text import (
+from pytest_garl.reports.run_record import KindRecord, RunRecord, SearchRecord
+from pytest_garl.reports.run_text import (
     headline_shares,
     in_control_text,
     kinds_lines,
+    legend,
     share_lines,
 )
 
@@ -35,13 +36,14 @@ _SKIPPED = f"Skipped: {NOT_JUDGED}:"
 """Begins pytest's reason for a test that its flight does not judge."""
 
 
-def write_run(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary]:
-    """Write a table per system and map, then the saved cases, and those that may be fixed.
-
-    Returns what it told of each search.
-    """
+def write_run(reporter: Any, run: Run, tally: Tally) -> None:
+    """Write a table for each search, then the saved cases, and those that may be fixed."""
     fold_skips(reporter)
-    searches = _write_searches(reporter, run, tally)
+    record = tally.run_record(run)
+    if record.searches:
+        reporter.section("garl: violations", sep="=")
+    for line in _lines_about(record, run, tally, reporter):
+        reporter.write_line(line)
     lines = [
         *_excused_lines(tally, width_of(reporter.config)),
         *saved_lines(run.investigated, reporter.config),
@@ -57,7 +59,6 @@ def write_run(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary]:
             reporter.section(f"garl: {title}", sep="=")
         for line in text:
             reporter.write_line(line)
-    return searches
 
 
 def write_status(reporter: Any, tally: Tally) -> None:
@@ -129,62 +130,38 @@ def _property_values(reporter: Any, outcomes: tuple[str, ...], key: str) -> set[
     }
 
 
-def _write_searches(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary]:
-    searches = _with_cases(run, tally.search_summaries(run.ledger))
-    if run.options.searches_or_repeats:
-        failures = [dataclasses.asdict(each) for each in tally.user_failures]
-        run.ledger.facts.note_user_failures(failures)
-        run.ledger.facts.note_ended()
-    if searches:
-        reporter.section("garl: violations", sep="=")
-        for line in _lines_about(searches, run, tally, reporter):
-            reporter.write_line(line)
-    return searches
-
-
-def _with_cases(run: Run, searches: list[SearchSummary]) -> list[SearchSummary]:
-    """Return the summaries with the causes that the cases of this run and the saved ones tell."""
-    systems = dict.fromkeys(each.system for each in searches)
-    cases = [
-        *(each.result.case for each in run.investigated),
-        *(entry.case for system in systems for entry in run.corpus.entries(system)),
-    ]
-    return [each.with_cases([case for case in cases if case]) for each in searches]
-
-
-def _lines_about(searches: list[SearchSummary], run: Run, tally: Tally, reporter: Any) -> list[str]:
+def _lines_about(record: RunRecord, run: Run, tally: Tally, reporter: Any) -> list[str]:
+    if not record.searches:
+        return []
     width = width_of(reporter.config)
     lines = [
         line
-        for each in searches
+        for each in record.searches
         for line in search_table(each, reporter.config, width, _films_of(run, each))
     ]
-    types = legend(kind for search in searches for kind in (*search.kinds, *search.findings))
-    lines += [wrapped(text, width) for text in (types, _costs(run)) if text]
-    lines += _not_finished(run, tally)
-    results_hash = run.ledger.queries.result_hash()[:16]
-    worlds = dict.fromkeys(_world(search) for search in searches if search.domains)
+    types = legend((*record.kinds, *record.findings))
+    lines += [wrapped(text, width) for text in (types, _costs(record, run.options)) if text]
+    lines += _not_finished(record, run, tally)
+    worlds = dict.fromkeys(_world(search) for search in record.searches if search.key.domain)
     lines += [wrapped(world, width, others="  ") for world in worlds]
-    return [*lines, f"ledger: {run.ledger.path}  results {results_hash}"]
+    return [*lines, f"ledger: {record.ledger}  results {record.results_sha256[:16]}"]
 
 
-def _not_finished(run: Run, tally: Tally) -> list[str]:
+def _not_finished(record: RunRecord, run: Run, tally: Tally) -> list[str]:
     """Return a line with the way to continue, if the search or its shrinking was interrupted."""
-    progress = run.ledger.queries.progress()
-    done, total = sum(each.flown for each in progress), sum(each.total for each in progress)
     if run.options.repeat:
         return []
     goes_on = "the same command with --garl-resume goes on"
-    if done < total:
-        return [f"not finished: {done} of {total} flown; {goes_on}"]
+    if record.flown < record.wanted:
+        return [f"not finished: {record.flown} of {record.wanted} flown; {goes_on}"]
     if tally.interrupted and run.investigations is not None:
-        return [f"not finished: all {total} flown, but no case is saved; {goes_on}"]
+        return [f"not finished: all {record.wanted} flown, but no case is saved; {goes_on}"]
     return []
 
 
-def _world(search: SearchSummary) -> str:
+def _world(search: SearchRecord) -> str:
     """Return the conditions of a search: its domain, and who moved the NPCs."""
-    return f"domain {' and '.join(search.domains)}, NPCs {' and '.join(search.npcs)}"
+    return f"domain {search.key.domain}, NPCs {' and '.join(search.npcs)}"
 
 
 def fold_skips(reporter: Any) -> None:
@@ -202,45 +179,41 @@ def fold_skips(reporter: Any) -> None:
             report.longrepr = (str(file), None, folded)
 
 
-def _costs(run: Run) -> str:
+def _costs(record: RunRecord, options: Options) -> str:
     """Return how many flights the run needed beside the budget, and how busy its workers were."""
-    meters = run.ledger.queries.meters()
-    flying, idle = meters.get("flying_s", 0.0), meters.get("idle_s", 0.0)
-    confirming = run.investigations.flown if run.investigations else 0
-    twins = run.ledger.facts.twins
-    repeating = meters.get("on_demand", 0) - confirming - twins
+    costs = record.costs
     counts = {
-        "flown again after a time-out or a kill": meters.get("retried", 0),
-        "to see whether violations repeat": max(0, repeating),
-        "to tell causes of one ending apart": twins,
-        "to confirm and shrink": confirming,
+        "flown again after a time-out or a kill": costs.flown_again,
+        "to see whether violations repeat": costs.repeating,
+        "to tell causes of one ending apart": costs.twins,
+        "to confirm and shrink": costs.confirming,
     }
-    words = [f"flights: {meters.get('flights', 0):.0f}"]
-    words += [f"{purpose} {count:.0f}" for purpose, count in counts.items() if count]
-    if run.options.shrink == 0 and not run.options.repeat:
+    words = [f"flights: {costs.flights}"]
+    words += [f"{purpose} {count}" for purpose, count in counts.items() if count]
+    if options.shrink == 0 and not options.repeat:
         words.append("nothing confirmed, shrunk or saved (--garl-shrink=0)")
-    if flying + idle > 0:
-        words.append(f"workers idle {100 * idle / (flying + idle):.0f} %")
+    if costs.idle_share is not None:
+        words.append(f"workers idle {100 * costs.idle_share:.0f} %")
     return ", ".join(words)
 
 
-def _films_of(run: Run, search: SearchSummary) -> Mapping[str, Path]:
-    return run.films.of_search(search.system, search.map) if run.films else {}
+def _films_of(run: Run, search: SearchRecord) -> Mapping[str, Path]:
+    return run.films.of_search(search.name) if run.films else {}
 
 
 def search_table(
-    search: SearchSummary,
+    search: SearchRecord,
     config: pytest.Config,
     width: int,
     films: Mapping[str, Path] = NO_FILMS,
 ) -> list[str]:
-    """Return the shares of a system on a map, then each kind of violation and how to see it.
+    """Return the shares of a search, then each kind of violation and how to see it.
 
     ``films`` are those of the kinds by signature.  What else was noted
     follows; no item fails for it.
     """
     lines = [
-        wrapped(f"{search.name} on {search.map}: {headline_shares(search)}", width, others="  "),
+        wrapped(f"{search.name}: {headline_shares(search)}", width, others="  "),
         *(
             wrapped(line, width, first="  ", others="    ")
             for line in (*share_lines(search), *kinds_lines(search))
@@ -254,8 +227,8 @@ def search_table(
 
 
 def _kind_lines(
-    search: SearchSummary,
-    kinds: Sequence[ViolationKind],
+    search: SearchRecord,
+    kinds: Sequence[KindRecord],
     config: pytest.Config,
     width: int,
     films: Mapping[str, Path] = NO_FILMS,

@@ -28,8 +28,9 @@ from pytest_garl.plugin.keys import (
 )
 
 if TYPE_CHECKING:
-    from pytest_garl.execution.ledger import Ledger
-    from pytest_garl.reports.search_summary import SearchSummary, SlotUserFailure
+    from pytest_garl.execution.facts import UserFailure
+    from pytest_garl.plugin.run import Run
+    from pytest_garl.reports.run_record import RunRecord
 
 
 class Tally:
@@ -61,7 +62,8 @@ class Tally:
         self._shown: dict[str, str] = {}
         self._left_to_others: dict[str, str] = {}
         self._user_failures: dict[str, list[str]] = {}
-        self._searches: list[SearchSummary] | None = None
+        self.record: RunRecord | None = None
+        """What was found, once all has been flown."""
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -125,29 +127,31 @@ class Tally:
             ignore_further_sigterm()
 
     @property
-    def user_failures(self) -> list[SlotUserFailure]:
+    def user_failures(self) -> list[UserFailure]:
         """The failed assertions about users' own properties, expected ones among them."""
-        from pytest_garl.reports.search_summary import SlotUserFailure
+        from pytest_garl.execution.facts import UserFailure
 
-        names = ("system", "map", "slot", "signature", "message")
+        names = ("search", "slot", "signature", "message")
         return [
-            SlotUserFailure(**dict(zip(names, json.loads(text), strict=True)))
+            UserFailure(**dict(zip(names, json.loads(text), strict=True)))
             for texts in self._user_failures.values()
             for text in texts
         ]
 
-    def search_summaries(self, ledger: Ledger) -> list[SearchSummary]:
-        """Return the summary of each search, read from the ledger once when all has been flown."""
-        from pytest_garl.reports.search_summary import search_summaries
+    def run_record(self, run: Run) -> RunRecord:
+        """Return the record of the run, read once when all has been flown."""
+        if self.record is None:
+            from pytest_garl.reports.run_reading import SessionFindings, record_of
 
-        if self._searches is None:
-            self._searches = search_summaries(ledger, self.user_failures)
-        return self._searches
-
-    @property
-    def without_landing(self) -> list[SearchSummary]:
-        """The searches in which no flight landed, once the summaries have been read."""
-        return [each for each in self._searches or () if not each.count("landed")]
+            if run.options.searches_or_repeats:
+                run.ledger.facts.note_user_failures(self.user_failures)
+                run.ledger.facts.note_ended()
+            found = SessionFindings(
+                cases=tuple(each.result.case for each in run.investigated if each.result.case),
+                confirming=run.investigations.flown if run.investigations else 0,
+            )
+            self.record = record_of(run.ledger, run.corpus, found)
+        return self.record
 
     @property
     def unasserted(self) -> Counter[str]:

@@ -14,7 +14,6 @@ from pytest_garl.plugin.terminal_text import begin_line
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.run import Run
-    from pytest_garl.reports.search_summary import SearchSummary
 
 
 def write_summary(reporter: Any, config: pytest.Config, tally: Tally) -> None:
@@ -46,7 +45,6 @@ def _join_workers(config: pytest.Config, tally: Tally) -> None:
 
 
 def _write_run(reporter: Any, run: Run, tally: Tally) -> None:
-    searches: list[SearchSummary] = []
     report = None
     with _one_line_if_broken(reporter, "the films"):
         if run.options.film:
@@ -56,15 +54,15 @@ def _write_run(reporter: Any, run: Run, tally: Tally) -> None:
     with _one_line_if_broken(reporter, "the summary"):
         from pytest_garl.plugin.summary import write_run
 
-        searches = write_run(reporter, run, tally)
+        write_run(reporter, run, tally)
     with _one_line_if_broken(reporter, "the pages"):
         from pytest_garl.plugin.pages import write_pages
 
-        report = write_pages(reporter, run)
+        report = write_pages(reporter, run, tally.run_record(run))
     with _one_line_if_broken(reporter, "the step summary"):
         from pytest_garl.plugin.github_summary import write_step_summary
 
-        write_step_summary(reporter, run, searches, report)
+        write_step_summary(reporter, run, tally.run_record(run), report)
 
 
 @contextlib.contextmanager

@@ -7,12 +7,11 @@ violation takes.  Shrinking finds out, so only a kind with a shrunk case has a c
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from pytest_garl.cases.case import Case
 from pytest_garl.execution.severity import Severity
 from pytest_garl.messages import shortened
-from pytest_garl.verdicts.ending import ending_of
 
 MOST_NAMED = 3
 """Of more conditions than these a title counts the rest."""
@@ -50,15 +49,6 @@ _PHASES = {
     "descent": "in the descent",
     "last-metre": "in the last metre",
 }
-
-
-def telling_case(cases: Iterable[Case], system: str, map: str, signature: str) -> Case | None:
-    """Return the first case that tells the cause of a kind: it is open, and shrunk."""
-    for case in cases:
-        is_its = (case.system, case.scenario.map) == (system, map)
-        if is_its and case.ending == ending_of(signature) and tells_cause(case):
-            return case
-    return None
 
 
 def tells_cause(case: Case) -> bool:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pytest_garl.errors import GarlError, SavingError
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.reference import BUILT_IN
@@ -43,7 +44,8 @@ class FilmTask:
 
 def recorded_flight(ledger: Ledger, flight: LedgerFlight) -> FlightTask:
     """Return a flight of a ledger with all that its film needs."""
-    return task_of(ledger, flight, flight.scenario, ledger.facts.camera(flight.system))
+    job = parse_job(ledger.job(flight.id.search) or "")
+    return task_of(flight, job, ledger.path, ledger.facts.camera(flight.system))
 
 
 def why_no_camera(simulator: str) -> str:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from pytest_garl.execution.facts import SearchKey, search_names
 from pytest_garl.messages import printable
-from pytest_garl.reports.search_summary import WHY_NO_LANDING
-from pytest_garl.reports.shares_text import percent
+from pytest_garl.reports.run_record import (
+    WHY_NO_LANDING,
+    KindRecord,
+    RunRecord,
+    SearchRecord,
+    Spread,
+)
+from pytest_garl.reports.run_text import percent
 
 SCHEMA = "pytest-garl-comparison"
 VERSION = 1
-Report = Mapping[str, Any]
-"""A run as ``run_report`` returns it."""
-_ALIKE = ("method", "budget", "seed", "domain", "npcs")
-"""Facts of a run that decide what its flights meet."""
+Pair = tuple[SearchRecord | None, SearchRecord | None]
+"""A search in the earlier run and in the later one."""
 NOTHING = "–"
 
 
@@ -46,8 +51,9 @@ class KindChange:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchComparison:
-    """One landing system on one map in two runs; a run without it has 0 flights."""
+    """One search in two runs; a run without it has 0 flights."""
 
+    name: str
     system: str
     map: str
     flown: tuple[int, int]
@@ -55,11 +61,6 @@ class SearchComparison:
     gained: tuple[KindChange, ...]
     lost: tuple[KindChange, ...]
     kept: tuple[KindChange, ...]
-
-    @property
-    def name(self) -> str:
-        """The name of the landing system's class, and the map."""
-        return f"{self.system.split(':')[-1]} on {self.map}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,60 +73,92 @@ class RunComparison:
     searches: tuple[SearchComparison, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """Return the comparison as values for JSON."""
-        return {"schema": SCHEMA, "version": VERSION, **dataclasses.asdict(self)}
+        """Return the comparison as values for JSON; system and map tell most searches apart."""
+        found = dataclasses.asdict(self)
+        for each in found["searches"]:
+            if each["name"] == SearchKey(system=each["system"], map=each["map"]).place:
+                del each["name"]
+        return {"schema": SCHEMA, "version": VERSION, **found}
 
 
-def compare_runs(before: Report, after: Report) -> RunComparison:
-    """Compare an earlier run with a later one, both as ``run_report`` returns them."""
-    of = [
-        {(each["system"], each["map"]): each for each in report["searches"]}
-        for report in (before, after)
-    ]
-    keys = dict.fromkeys(key for searches in of for key in searches)
+def compare_runs(before: RunRecord, after: RunRecord) -> RunComparison:
+    """Compare an earlier run with a later one."""
+    pairs = _pairs(before, after)
+    names = search_names(_key(pair) for pair in pairs)
     return RunComparison(
-        before=before["ledger"],
-        after=after["ledger"],
+        before=str(before.ledger),
+        after=str(after.ledger),
         unlike=tuple(_unlike(before, after)),
-        searches=tuple(_search(key, of[0].get(key), of[1].get(key)) for key in keys),
+        searches=tuple(_search(pair, names[_key(pair)]) for pair in pairs),
     )
 
 
-def _unlike(before: Report, after: Report) -> Iterable[Side]:
+def _pairs(before: RunRecord, after: RunRecord) -> list[Pair]:
+    """Return the searches side by side.
+
+    The only search of a landing system on a map has the place of the other run's only one, be it in
+    another domain; of several each has that of the same domain and tests.
+    """
+    both = before.searches, after.searches
+    by_place: dict[tuple[str, str], tuple[list[SearchRecord], list[SearchRecord]]] = {}
+    for side, searches in enumerate(both):
+        for each in searches:
+            place = by_place.setdefault((each.key.system, each.key.map), ([], []))
+            place[side].append(each)
+    pairs: list[Pair] = []
+    for first, second in by_place.values():
+        if max(len(first), len(second)) == 1:
+            pairs.append((next(iter(first), None), next(iter(second), None)))
+            continue
+        found = [{each.key: each for each in side} for side in (first, second)]
+        keys = dict.fromkeys(key for side in found for key in side)
+        pairs += [(found[0].get(key), found[1].get(key)) for key in keys]
+    return pairs
+
+
+def _key(pair: Pair) -> SearchKey:
+    """Return the key of a pair, that of the later run if both have it."""
+    return next(each.key for each in reversed(pair) if each is not None)
+
+
+def _unlike(before: RunRecord, after: RunRecord) -> Iterable[Side]:
     facts = [
         {
-            **{key: report["run"][key] for key in _ALIKE},
-            "pytest-garl": report["pytest_garl"],
-            "finished": "yes" if report["complete"] else "no",
+            # What decides what its flights meet.
+            "method": run.options.method,
+            "budget": run.options.budget,
+            "seed": run.options.seed,
+            "domain": run.options.domain,
+            "npcs": run.options.npcs,
+            "pytest-garl": run.version,
+            "finished": "yes" if run.complete else "no",
         }
-        for report in (before, after)
+        for run in (before, after)
     ]
     for name, value in facts[0].items():
         if value != facts[1][name]:
             yield Side(name=name, before=str(value), after=str(facts[1][name]))
 
 
-def _search(
-    key: tuple[str, str], before: Mapping[str, Any] | None, after: Mapping[str, Any] | None
-) -> SearchComparison:
-    counts = [
-        {kind["signature"]: kind for kind in (each or {"signatures": ()})["signatures"]}
-        for each in (before, after)
-    ]
-    flown = (before["flown"] if before else 0, after["flown"] if after else 0)
+def _search(pair: Pair, name: str) -> SearchComparison:
+    before, after = pair
+    counts = [{kind.signature: kind for kind in each.kinds} if each else {} for each in pair]
+    flown = (before.flown if before else 0, after.flown if after else 0)
     signatures = sorted(dict.fromkeys((*counts[0], *counts[1])))
     changes = [
         _change(each, counts[0].get(each), counts[1].get(each), flown) for each in signatures
     ]
     changes.sort(key=lambda change: -(change.before + change.after))
     both = before is not None and after is not None
+    key = _key(pair)
     return SearchComparison(
-        system=key[0],
-        map=key[1],
+        name=name,
+        system=key.system,
+        map=key.map,
         flown=flown,
         sides=tuple(
-            Side(name=name, before=one, after=other)
-            for (name, one), (_, other) in zip(_figures(before), _figures(after), strict=True)
+            Side(name=title, before=one, after=other)
+            for title, one, other in zip(_FIGURES, _figures(before), _figures(after), strict=True)
         ),
         gained=tuple(each for each in changes if both and not each.before),
         lost=tuple(each for each in changes if both and not each.after),
@@ -134,50 +167,60 @@ def _search(
 
 
 def _change(
-    signature: str,
-    before: Mapping[str, Any] | None,
-    after: Mapping[str, Any] | None,
-    flown: tuple[int, int],
+    signature: str, before: KindRecord | None, after: KindRecord | None, flown: tuple[int, int]
 ) -> KindChange:
-    counts = (before["count"] if before else 0, after["count"] if after else 0)
+    counts = (before.count if before else 0, after.count if after else 0)
     by_chance = None
     if all(flown) and not all(counts):
         seen, unseen = (0, 1) if counts[0] else (1, 0)
         by_chance = (1 - counts[seen] / flown[seen]) ** flown[unseen]
+    known = after or before
     return KindChange(
         signature=signature,
-        headline=(after or before or {})["headline"],
+        headline=known.headline if known else "",
         before=counts[0],
         after=counts[1],
         by_chance=by_chance,
     )
 
 
-def _figures(search: Mapping[str, Any] | None) -> list[tuple[str, str]]:
-    """Return the figures of a search in words, each with its name; dashes for a run without it."""
-    found = search or {}
-    flown = int(found.get("flown", 0))
+_FIGURES = (
+    "flights",
+    "landed",
+    *(f"gave up, {why}" for why in WHY_NO_LANDING),
+    "not landed",
+    "violate something",
+    "software crashes",
+    "kinds of violation",
+    "effective kinds",
+    "median distance of landings",
+    "median time of landings",
+)
 
-    def share(count: int) -> str:
-        return percent(count, flown) if flown else NOTHING
 
-    def spread(name: str, unit: str, digits: int) -> str:
-        value = found.get(name)
-        return f"{value['median']:.{digits}f} {unit}" if value else NOTHING
-
-    gave_up = found.get("gave_up", {})
-    return [
-        ("flights", str(flown) if search else NOTHING),
-        ("landed", share(found.get("landed", 0))),
-        *((f"gave up, {why}", share(gave_up.get(why, 0))) for why in WHY_NO_LANDING),
-        ("not landed", share(sum(found.get("not_landed", {}).values()))),
-        ("violate something", share(found.get("violating", 0))),
-        ("software crashes", share(sum(found.get("crashes", {}).values()))),
-        ("kinds of violation", str(len(found["signatures"])) if search else NOTHING),
-        ("effective kinds", f"{found['effective_kinds']:.1f}" if search else NOTHING),
-        ("median distance of landings", spread("landing_distance_m", "m", 2)),
-        ("median time of landings", spread("landing_time_s", "s", 1)),
+def _figures(search: SearchRecord | None) -> list[str]:
+    """Return the figures of a search in words, in the order of their names; else dashes."""
+    if search is None:
+        return [NOTHING] * len(_FIGURES)
+    counts = [
+        search.landed,
+        *(search.gave_up[why] for why in WHY_NO_LANDING),
+        sum(search.not_landed.values()),
+        search.violating,
+        sum(search.crashes.values()),
     ]
+    return [
+        str(search.flown),
+        *(percent(count, search.flown) for count in counts),
+        str(len(search.kinds)),
+        f"{search.effective_kinds:.1f}",
+        _median(search.landing_distance_m, "m", 2),
+        _median(search.landing_time_s, "s", 1),
+    ]
+
+
+def _median(spread: Spread | None, unit: str, digits: int) -> str:
+    return f"{spread.median:.{digits}f} {unit}" if spread else NOTHING
 
 
 def change_text(change: KindChange, flown: tuple[int, int]) -> str:

@@ -13,9 +13,13 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from pytest_garl.cli.report_command import _text
-from pytest_garl.reports.run_report import SCHEMA
+from pytest_garl.cases.corpus import Corpus
+from pytest_garl.reports.run_json import SCHEMA
+from pytest_garl.reports.run_reading import read_run
+from pytest_garl.reports.run_text import run_text
 from tests.support.landing_project import result_hash, write_project
+from tests.support.report_ledgers import Flown, write_ledger
+from tests.support.results import flight_result
 
 VALIDATOR = Draft202012Validator(json.loads(SCHEMA.read_text()))
 
@@ -202,22 +206,16 @@ def test_a_report_is_written_to_a_file_or_printed_as_text(searched: Path) -> Non
     assert "\n        unusual in the mildest of them: a hostile dog at 0.0 m/s for 14.2 s" in words
 
 
-def test_the_text_counts_flights_whose_time_ran_out() -> None:
-    search = {
-        "system": "m:Patient",
-        "map": "lawn",
-        "flown": 3,
-        "wanted": 3,
-        "landed": 1,
-        "violating": 2,
-        "violating_by_the_paper": 2,
-        "gave_up": {"needless": 0, "excused": 0, "blocked": 0},
-        "not_landed": {"needless": 1, "excused": 1, "blocked": 0},
-        "control": None,
-        "signatures": [],
-    }
-    told = _text({"searches": [search]})
-    assert "2 violate (2 by the paper's definition, which counts not landing)" in told
+def test_the_text_counts_flights_whose_time_ran_out(tmp_path: Path) -> None:
+    late: dict[str, Any] = {"outcome": "not_landed", "paper_violation": True}
+    results = (
+        flight_result(completed=True),
+        flight_result("late:not-landed", primary="time", violation_type="late", **late),
+        flight_result(excuse="undetectable", **late),
+    )
+    path = write_ledger(tmp_path, [Flown(result=each) for each in results])
+    told = run_text(read_run(path, Corpus(tmp_path)))
+    assert "1 violate (2 by the paper's definition, which counts not landing)" in told
     assert "blocked 0; ran out of time: needless 1, excused 1, blocked 0\n" in told
 
 

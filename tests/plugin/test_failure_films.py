@@ -18,6 +18,7 @@ from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.stored_ledger import checked_ledger
 from pytest_garl.plugin import failure_films
 from pytest_garl.plugin.tally import Tally
+from pytest_garl.reports.run_reading import record_of
 from tests.plugin.test_resume import slow_project, start, wait_for
 from tests.reports.html.test_report import lost
 from tests.support.broken_lander import case_of_broken_lander
@@ -217,9 +218,10 @@ def session(
     )
     options = SimpleNamespace(films=tmp_path / "films", workers=2)
     with checked_ledger(write_ledger(tmp_path, flown)) as ledger:
-        yield SimpleNamespace(
-            reporter=reporter, run=SimpleNamespace(options=options, ledger=ledger)
-        )
+        tally = Tally()
+        tally.record = record_of(ledger, Corpus(tmp_path))
+        run = SimpleNamespace(options=options, ledger=ledger)
+        yield SimpleNamespace(reporter=reporter, run=run, tally=tally)
 
 
 def pretend(monkeypatch: pytest.MonkeyPatch, problem: str = "") -> list[str]:
@@ -242,9 +244,9 @@ def test_the_most_frequent_kinds_have_films_and_the_others_are_named(
     session: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = pretend(monkeypatch)
-    found = failure_films.draw_failures(session.reporter, session.run, Tally())
+    found = failure_films.draw_failures(session.reporter, session.run, session.tally)
     assert asked == [f"lawn-g00-s{n:02d}.mp4" for n in (1, 0, 3, 4, 5, 6, 7, 8, 9, 10)]
-    of_search = found.of_search("my_stack:Hovers", "lawn")
+    of_search = found.of_search("Hovers on lawn")
     assert of_search["II:lost:01"].name == "lawn-g00-s01.mp4"
     assert len(of_search) == 10
     assert session.reporter.lines == ["garl: drawing 10 films of what failed, about 30 s"]
@@ -259,9 +261,7 @@ def test_a_slot_of_two_systems_has_two_films() -> None:
         flight: Any = SimpleNamespace(
             id=FlightId(search=search * 16, map="lawn", slot=Slot(generation=0, index=index))
         )
-        return failure_films._Failure(
-            key=(system, "lawn", "I"), name=flight.id.slot_id, flight=flight
-        )
+        return failure_films._Failure(key=(system, "I"), name=flight.id.slot_id, flight=flight)
 
     both = [failure("a:A", "a", 1), failure("b:B", "b", 1), failure("b:B", "b", 2)]
     assert failure_films._names(both) == [
@@ -273,7 +273,7 @@ def test_a_slot_of_two_systems_has_two_films() -> None:
 
 def test_a_reason_is_told_once(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     pretend(monkeypatch, "no space left")
-    found = failure_films.draw_failures(session.reporter, session.run, Tally())
+    found = failure_films.draw_failures(session.reporter, session.run, session.tally)
     assert found.files == {}
     names = "lawn-g00-s01, lawn-g00-s00, lawn-g00-s03, lawn-g00-s04, lawn-g00-s05 and 5 more"
     assert f"no film of {names}: no space left" in found.notes
@@ -288,12 +288,12 @@ def test_ctrl_c_keeps_the_films_that_are_drawn(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("pytest_garl.reports.films.draw_films", interrupted)
-    found = failure_films.draw_failures(session.reporter, session.run, Tally())
+    found = failure_films.draw_failures(session.reporter, session.run, session.tally)
     assert [each.name for each in found.files.values()] == ["lawn-g00-s01.mp4"]
     assert found.notes[1] == "interrupted while films were drawn; `garl film SLOT` draws the others"
 
 
 def test_a_folder_that_cannot_be_made_is_one_note(session: Any) -> None:
     session.run.options.films.write_text("a file")
-    found = failure_films.draw_failures(session.reporter, session.run, Tally())
+    found = failure_films.draw_failures(session.reporter, session.run, session.tally)
     assert any("films: no films can be written here" in note for note in found.notes)

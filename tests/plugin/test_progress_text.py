@@ -17,8 +17,8 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.time_left import FIRST_FLIGHTS, NewKinds
 
 TWO = (
-    SearchProgress(system="m:A", map="court", flown=3, total=4, generation=1),
-    SearchProgress(system="m:A", map="lawn", flown=1, total=4, generation=0),
+    SearchProgress(search="s", system="m:A", map="court", flown=3, total=4, generation=1),
+    SearchProgress(search="s", system="m:A", map="lawn", flown=1, total=4, generation=0),
 )
 
 
@@ -64,7 +64,12 @@ class Flown:
     def progress(self) -> list[SearchProgress]:
         return [
             SearchProgress(
-                system="m:A", map="lawn", flown=self.flown, total=self.wanted, generation=0
+                search="s",
+                system="m:A",
+                map="lawn",
+                flown=self.flown,
+                total=self.wanted,
+                generation=0,
             )
         ]
 
@@ -170,7 +175,7 @@ def test_line_of_a_run_that_does_not_shrink_speaks_of_repeating_only() -> None:
     repeating = dataclasses.replace(PROGRESS, shrinks=False, flown_after=3.0, expected_after=4.0)
     line = progress_line(repeating, 200)
     assert "4/8 flights, 3/~4 to repeat" in line
-    done = SearchProgress(system="m:A", map="court", flown=8, total=8, generation=1)
+    done = SearchProgress(search="s", system="m:A", map="court", flown=8, total=8, generation=1)
     ended = dataclasses.replace(repeating, searches=[done], left_s=3.0, after_search=True)
     assert progress_line(ended, 200).startswith(
         "garl [##################--]  8/8 flights, 3/~4 to repeat  3 s left  I:2 IV:1  repeating  "
@@ -187,7 +192,7 @@ def test_narrow_terminal_gets_whole_phrases(width: int) -> None:
 
 
 def test_line_follows_the_forecast_once_there_is_one() -> None:
-    done = SearchProgress(system="m:A", map="court", flown=4, total=4, generation=0)
+    done = SearchProgress(search="s", system="m:A", map="court", flown=4, total=4, generation=0)
     shrinking = RunProgress(
         searches=[done],
         kinds={"IV": 3},

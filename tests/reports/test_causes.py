@@ -1,14 +1,17 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from pytest_garl.cases.case import Case
+from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.severity import Severity
-from pytest_garl.reports.causes import cause_of, counted_causes, telling_case, title_of
-from pytest_garl.reports.search_summary import SearchSummary, ViolationKind
+from pytest_garl.reports.causes import cause_of, counted_causes, title_of
+from pytest_garl.reports.run_record import KindRecord, SavedCase, SearchRecord
 from tests.cases.samples import SYSTEM, case
 
 DOG = Severity(about="body", grade="careless", type="dog", objects=1, speed_mps=4.0)
@@ -82,7 +85,7 @@ def test_what_was_not_tried_is_no_cause() -> None:
     assert title_of(shrunk("II:never-seen", perhaps)) == words
     guess = shrunk("II:never-seen", dataclasses.replace(both, untried=("fog", "decoy-2")))
     assert not guess.is_shrunk
-    assert telling_case([guess], SYSTEM, "lawn", "II:never-seen") is None
+    assert telling([guess]) is None
 
 
 def test_the_strength_and_the_number_of_an_object_are_no_part_of_a_cause() -> None:
@@ -96,60 +99,76 @@ def test_only_an_open_and_shrunk_case_tells_a_cause() -> None:
     fixed = dataclasses.replace(fog, status="fixed")
     other = dataclasses.replace(fog, system="another:Lander")
     cases = [raw, fixed, other, fog]
-    assert telling_case(cases, SYSTEM, "lawn", "II:never-seen") is fog
-    assert telling_case(cases[:3], SYSTEM, "lawn", "II:never-seen") is None
-    assert telling_case(cases, SYSTEM, "court", "II:never-seen") is None
+    assert telling(cases) is fog
+    assert telling(cases[:3]) is None
+    assert telling(cases, "court") is None
 
 
-def kind(signature: str, count: int) -> ViolationKind:
+def test_a_case_that_is_not_saved_tells_a_cause_if_no_saved_one_does() -> None:
+    fog = shrunk("II:never-seen", conditions(fog="visibility 10 m"))
+    rain = shrunk("II:never-seen", conditions(rain="2 mm/h"))
+    saved = SavedCase(path=Path("a.toml"), case=fog, known=False)
+    search = record(kind("II:never-seen", 4))
+    assert search.with_cases([saved], [rain]).kinds[0].case is fog
+    assert search.with_cases([], [rain]).kinds[0].case is rain
+
+
+def telling(cases: Sequence[Case], map: str = "lawn") -> Case | None:
+    """Return the case that tells the cause of a kind on a map."""
+    saved = [SavedCase(path=Path("a.toml"), case=each, known=False) for each in cases]
+    key = SearchKey(system=SYSTEM, map=map)
+    return kind("II:never-seen", 4).with_cases(key, saved).case
+
+
+def kind(signature: str, count: int) -> KindRecord:
     raw = conditions(fog="visibility 9 m", rain="2 mm/h")
-    return ViolationKind(
+    return KindRecord(
         signature=signature,
-        count=count,
-        first="lawn-g00-s01",
+        slots=tuple(f"lawn-g00-s{index:02d}" for index in range(1, count + 1)),
         story="Gave up.",
-        headline="gave up",
         severity=raw,
         severest="lawn-g00-s02",
     )
 
 
-def summary(*kinds: ViolationKind) -> SearchSummary:
-    return SearchSummary(
-        system=SYSTEM, map="lawn", files=(), flights=(), kinds=kinds, violating=len(kinds)
-    )
+def record(*kinds: KindRecord) -> SearchRecord:
+    key = SearchKey(system=SYSTEM, map="lawn")
+    return SearchRecord(key=key, name=key.place, flights=(), kinds=kinds, violating=len(kinds))
 
 
 def test_kinds_of_one_cause_stand_together_and_are_counted() -> None:
-    search = summary(
+    search = record(
         kind("IV:dog:descent:seen", 5),
         kind("II:never-seen", 4),
         kind("V:ValueError@x", 3),
         kind("II:lost:descent", 2),
     )
-    assert search.causes == ""
+    assert search.causes == 0
     fog = conditions(fog="visibility 10 m")
     cases = [
         shrunk("II:never-seen", fog),
         shrunk("II:lost:descent", fog),
         shrunk("IV:dog:descent:seen", DOG),
     ]
-    told = search.with_cases(cases)
+    told = search.with_cases([], cases)
     assert [each.signature for each in told.kinds] == [
         "II:never-seen",
         "II:lost:descent",
         "IV:dog:descent:seen",
         "V:ValueError@x",
     ]
-    assert told.causes == "3 of them shrunk, with 2 causes"
+    assert told.causes == 2
+    text = counted_causes([each.case for each in told.kinds])
+    assert text == "3 of them shrunk, with 2 causes"
     assert counted_causes([each.case for each in told.kinds[:3]]) == "2 causes"
 
 
 def test_the_least_comes_from_the_case_once_there_is_one() -> None:
-    search = summary(kind("II:never-seen", 4))
+    search = record(kind("II:never-seen", 4))
     (raw,) = search.kinds
     assert raw.title == ""
     assert raw.least == "unusual in lawn-g00-s02: fog (visibility 9 m), rain (2 mm/h)"
-    (told,) = search.with_cases([shrunk("II:never-seen", conditions(fog="visibility 10 m"))]).kinds
+    cases = [shrunk("II:never-seen", conditions(fog="visibility 10 m"))]
+    (told,) = search.with_cases([], cases).kinds
     assert told.title == "fog of 10 m: the marker is never readable"
     assert told.least == "at the least: fog alone, visibility 10 m"

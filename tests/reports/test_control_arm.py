@@ -7,13 +7,15 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.plugin.github_summary import _flights
 from pytest_garl.plugin.summary import search_table
 from pytest_garl.reports.control_arm import LEAST_FLIGHTS, control_arm, is_control
-from pytest_garl.reports.search_summary import SearchSummary, _kinds
-from pytest_garl.reports.shares_text import control_text, kinds_lines
+from pytest_garl.reports.run_reading import kinds_of
+from pytest_garl.reports.run_record import SearchRecord
+from pytest_garl.reports.run_text import control_text, kinds_lines
 from tests.support.results import flight_result
 
 DOG, BIRD, LOST = "IV:dog:descent:seen", "IV:bird:descent:seen", "II:lost:descent"
@@ -34,7 +36,9 @@ def flights(*generations: Sequence[str]) -> list[LedgerFlight]:
     ]
 
 
-def summary(flown: list[LedgerFlight], method: Any = "garl", own: Sequence[str] = ()) -> Any:
+def record(
+    flown: list[LedgerFlight], method: Any = "garl", own: Sequence[str] = ()
+) -> SearchRecord:
     stories: dict[str, list[tuple[str, str]]] = {}
     for each in flown:
         if each.signature:
@@ -43,25 +47,25 @@ def summary(flown: list[LedgerFlight], method: Any = "garl", own: Sequence[str] 
         stories.setdefault("own:test_it:1234", []).append((slot, "too slow"))
     random = {each.id.slot_id for each in flown if is_control(method, each.id.slot.generation)}
     control = control_arm(method, flown)
-    return SearchSummary(
-        system="my_landing:Mine",
-        map="lawn",
-        files=("test_it.py",),
+    key = SearchKey(system="my_landing:Mine", map="lawn", tests=("test_it.py::test_it",))
+    return SearchRecord(
+        key=key,
+        name=key.place,
         flights=tuple(flown),
-        kinds=_kinds(stories, random_slots=random if control else None),
+        kinds=kinds_of(stories, random_slots=random if control else None),
         violating=0,
         control=control,
     )
 
 
 def text(*generations: Sequence[str]) -> str:
-    return control_text(summary(flights(*generations)))
+    return control_text(record(flights(*generations)))
 
 
 @pytest.mark.parametrize("method", ["random", "garl-paper", "ga", "mine:Garl", "", None, 3])
 def test_other_methods_have_no_control_arm(method: Any) -> None:
     assert control_arm(method, flights([DOG] * 40, [DOG] * 40)) is None
-    assert control_text(summary(flights([DOG] * 40, [DOG]), method)) == ""
+    assert control_text(record(flights([DOG] * 40, [DOG]), method)) == ""
 
 
 def test_generation_0_of_garl_is_the_control_arm() -> None:
@@ -109,7 +113,8 @@ def test_killed_search_counts_the_flights_that_it_has() -> None:
 
 
 def test_assertions_of_the_user_are_left_out_of_the_comparison_but_counted_by_kind() -> None:
-    search = summary(flights([DOG] * 20, [""] * 20), own=("lawn-g00-s00", "lawn-g01-s00"))
+    search = record(flights([DOG] * 20, [""] * 20), own=("lawn-g00-s00", "lawn-g01-s00"))
+    assert search.control is not None
     assert search.control.random.kinds == 1
     assert control_text(search).endswith("(assertions of your own left out)")
     assert {kind.signature: kind.in_control for kind in search.kinds} == {
@@ -121,7 +126,7 @@ def test_assertions_of_the_user_are_left_out_of_the_comparison_but_counted_by_ki
 def test_table_says_of_each_kind_in_how_many_random_flights_it_was_seen(
     pytestconfig: pytest.Config,
 ) -> None:
-    search = summary(flights([DOG, ""], [BIRD, BIRD, BIRD]))
+    search = record(flights([DOG, ""], [BIRD, BIRD, BIRD]))
     lines = [line.strip() for line in search_table(search, pytestconfig, 120)]
     assert "2 kinds of violation, as diverse as 1.8 equally frequent ones" in lines
     assert "seen in 1 of 2 random flights" in lines
@@ -130,10 +135,10 @@ def test_table_says_of_each_kind_in_how_many_random_flights_it_was_seen(
         "3 (0 of 2 random)",
         "1 (1 of 2 random)",
     ]
-    other = summary(flights([DOG, ""], [BIRD, BIRD, BIRD]), "random")
+    other = record(flights([DOG, ""], [BIRD, BIRD, BIRD]), "random")
     assert "random flights" not in "\n".join(search_table(other, pytestconfig, 120))
     assert [_flights(other, kind) for kind in other.kinds] == ["3", "1"]
 
 
 def test_one_kind_alone_has_no_diversity() -> None:
-    assert kinds_lines(summary(flights([DOG, DOG]), "random")) == []
+    assert kinds_lines(record(flights([DOG, DOG]), "random")) == []

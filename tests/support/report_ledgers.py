@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
@@ -73,7 +74,8 @@ def write_ledger(
         )
     if camera is not None:
         ledger.facts.note_camera(system, camera)
-    ledger.facts.note_files(system, "lawn", ["test_it.py"])
+    tests = ("test_it.py::test_it",)
+    ledger.facts.note_search(search, SearchKey(system=system, map="lawn", tests=tests))
     ledger.facts.note_began(datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC))
     ledger.facts.note_ended(datetime(2026, 1, 2, 3, 5, 5, tzinfo=UTC))
     ledger.close()

@@ -6,18 +6,16 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pytest_garl.reports.search_summary import LEGEND, SearchSummary
-from pytest_garl.reports.shares_text import percent
+from pytest_garl.reports.run_record import IDLE, INCONCLUSIVE, LANDED, SearchRecord
+from pytest_garl.reports.run_text import LEGEND, percent
 
 SIDE = 100.0
 """Charts are drawn on a square of this side; the page stretches it."""
 MOST_COLOURS = 8
-IDLE = "idle"
-"""The colour of flights in which nobody could have landed."""
 _NAMES = {
-    "landed": "landed as it should",
+    LANDED: "landed as it should",
     IDLE: "did not land, excused or blocked",
-    "inconclusive": "inconclusive",
+    INCONCLUSIVE: "inconclusive",
 }
 
 
@@ -58,68 +56,32 @@ class Plot:
         return tuple(SIDE * (1 - tick / self.highest) for tick in self.ticks)
 
 
-def outcome_bar(search: SearchSummary) -> tuple[Segment, ...]:
+def outcome_bar(search: SearchRecord) -> tuple[Segment, ...]:
     """Return how the flights of a search ended, each in one part of a bar."""
-    own = {
-        slot for kind in search.kinds if kind.signature.startswith("own:") for slot in kind.slots
-    }
-    counts: dict[str, int] = {}
-    for flight in search.flights:
-        verdict, kind = flight.result.verdict, "landed"
-        if flight.result.inconclusive:
-            kind = "inconclusive"
-        elif verdict.violation_type:
-            kind = verdict.violation_type
-        elif flight.id.slot_id in own:
-            kind = "own"
-        elif flight.result.outcome != "landed":
-            kind = IDLE
-        counts[kind] = counts.get(kind, 0) + 1
-    order = ["landed", IDLE, *LEGEND, "inconclusive"]
-    total, left, found = len(search.flights), 0.0, []
-    for kind in sorted(counts, key=order.index):
-        width = SIDE * counts[kind] / total
+    order = [LANDED, IDLE, *LEGEND, INCONCLUSIVE]
+    left, found = 0.0, []
+    for kind, count in sorted(search.ends.items(), key=lambda each: order.index(each[0])):
+        width = SIDE * count / search.flown
         meaning = _NAMES.get(kind) or f"{kind}: {LEGEND[kind]}"
-        text = f"{meaning}: {counts[kind]} ({percent(counts[kind], total)})"
+        text = f"{meaning}: {count} ({percent(count, search.flown)})"
         found.append(
-            Segment(
-                kind=kind,
-                left=round(left, 3),
-                width=round(width, 3),
-                count=counts[kind],
-                text=text,
-            )
+            Segment(kind=kind, left=round(left, 3), width=round(width, 3), count=count, text=text)
         )
         left += width
     return tuple(found)
 
 
-def kinds_over_flights(searches: Sequence[SearchSummary]) -> Plot | None:
+def kinds_over_flights(searches: Sequence[SearchRecord]) -> Plot | None:
     """Return how many kinds of violation each search had found after so many flights."""
-    numbers = []
-    for search in searches:
-        seen: set[str] = set()
-        counts = [0]
-        for flight in search.flights:
-            if flight.result.verdict.violation:
-                seen.add(flight.signature)
-            counts.append(len(seen))
-        numbers.append(counts)
-    return _plot([f"{each.name} on {each.map}" for each in searches], numbers)
+    return _plot(searches, [each.kinds_over_flights for each in searches])
 
 
-def violations_over_flights(searches: Sequence[SearchSummary]) -> Plot | None:
+def violations_over_flights(searches: Sequence[SearchRecord]) -> Plot | None:
     """Return how many flights of each search had violated something after so many flights."""
-    numbers = []
-    for search in searches:
-        counts = [0]
-        for flight in search.flights:
-            counts.append(counts[-1] + flight.result.verdict.violation)
-        numbers.append(counts)
-    return _plot([f"{each.name} on {each.map}" for each in searches], numbers)
+    return _plot(searches, [each.violations_over_flights for each in searches])
 
 
-def _plot(names: Sequence[str], numbers: Sequence[Sequence[int]]) -> Plot | None:
+def _plot(searches: Sequence[SearchRecord], numbers: Sequence[Sequence[int]]) -> Plot | None:
     longest = max((len(each) - 1 for each in numbers), default=0)
     if not longest:
         return None
@@ -133,13 +95,13 @@ def _plot(names: Sequence[str], numbers: Sequence[Sequence[int]]) -> Plot | None
     highest = -(-most // spacing) * spacing
     curves = tuple(
         Curve(
-            name=name,
+            name=search.name,
             colour=index % MOST_COLOURS + 1,
             dash=index // MOST_COLOURS % 3,
             points=_points(counts, longest, highest),
             last=counts[-1],
         )
-        for index, (name, counts) in enumerate(zip(names, numbers, strict=True))
+        for index, (search, counts) in enumerate(zip(searches, numbers, strict=True))
     )
     return Plot(
         curves=curves,

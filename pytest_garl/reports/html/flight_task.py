@@ -10,8 +10,7 @@ from typing import Any
 from pytest_garl.cases.case import NOT_ASKED, Prevention
 from pytest_garl.cases.description import describe
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.job import FlightJob, parse_job
-from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.reference import BUILT_IN
 from pytest_garl.execution.result import FlightResult
@@ -92,18 +91,17 @@ class ShownFlight:
 
 
 def task_of(
-    ledger: Ledger, flight: LedgerFlight, scenario: str, camera: Mapping[str, Any] | None
+    flight: LedgerFlight, job: FlightJob, ledger: Path, camera: Mapping[str, Any] | None
 ) -> FlightTask:
-    """Return a flight of a ledger with all that is needed to show it.
+    """Return a flight of the ledger at a path with all that is needed to show it.
 
     Its record may lie beside the ledger, or where it was flown.
     """
-    job = parse_job(ledger.job(flight.id.search) or "")
-    beside = flight.id.record(ledger.path.parent / "flights")
+    beside = flight.id.record(ledger.parent / "flights")
     return FlightTask(
         name=flight.id.slot_id,
         job=job,
-        scenario=scenario,
+        scenario=flight.scenario,
         result=flight.result,
         sha256=flight.sha256,
         records=tuple(dict.fromkeys((beside, job.record(flight.id)))),

@@ -23,7 +23,9 @@ MOST_PICTURES = 24
 
 def page_link(kind: KindRow, folder: Path, url: str) -> str:
     """Return a link to the page of a kind, or its file if the report is published nowhere."""
-    return f"[page]({url}/{kind.address})" if url else code(f"{folder.name}/{kind.address}")
+    return (
+        f"[page]({url}/{kind.page.address})" if url else code(f"{folder.name}/{kind.page.address}")
+    )
 
 
 def index_parts(page: RunPage, folder: Path, url: str) -> list[str]:
@@ -50,14 +52,18 @@ def index_parts(page: RunPage, folder: Path, url: str) -> list[str]:
 def _pictures(page: RunPage, url: str) -> list[str]:
     """Return the picture of each kind that shows its cause, in the order of the index."""
     shown = [kind for kind in page.kinds if kind.still]
-    parts = [
-        f'<a href="{url}/{kind.address}"><img src="{url}/{kind.still}" width="{PICTURE_WIDTH}" '
-        f'alt="{escape(kind.signature)}"></a><br>'
-        f"{escaped(kind.signature)}, {escaped(kind.where)}: {escaped(kind.title)}"
-        for kind in shown[:MOST_PICTURES]
-    ]
+    parts = [_picture(kind, url) for kind in shown[:MOST_PICTURES]]
     left = len(shown) - len(parts)
     return [*parts, f"{left} more kinds have pictures in the report."] if left > 0 else parts
+
+
+def _picture(kind: KindRow, url: str) -> str:
+    page = kind.page
+    return (
+        f'<a href="{url}/{page.address}"><img src="{url}/{kind.still}" width="{PICTURE_WIDTH}" '
+        f'alt="{escape(page.signature)}"></a><br>'
+        f"{escaped(page.signature)}, {escaped(page.where)}: {escaped(page.title)}"
+    )
 
 
 def _folded(title: str, pairs: tuple[Fact, ...]) -> str:

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from pytest_garl.cases.case import NO_GATE_TEXTS, Case
-from pytest_garl.cases.corpus import Corpus, CorpusEntry
 from pytest_garl.cases.story_text import grade_in_words
-from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.messages import command, shortened
 from pytest_garl.reports.html.flight_tables import cut_text
 from pytest_garl.reports.html.flight_task import FlightTask, ShownFlight, task_of
-from pytest_garl.reports.html.naming import page_name, shown_file
-from pytest_garl.reports.search_summary import LEGEND, SearchSummary, ViolationKind
-from pytest_garl.reports.shares_text import in_control_text
+from pytest_garl.reports.html.naming import page_address, page_name, shown_file
+from pytest_garl.reports.run_record import KindRecord, RunRecord, SavedCase, SearchRecord
+from pytest_garl.reports.run_text import LEGEND, in_control_text, repeat_command
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.verdicts.wording import headline
 
@@ -35,9 +32,8 @@ class KindPlan:
     """
 
     name: str
-    search: SearchSummary
-    kind: ViolationKind
-    entry: CorpusEntry | None
+    search: SearchRecord
+    kind: KindRecord
     repeat: str
     task: FlightTask
     found: FlightTask | None
@@ -45,7 +41,12 @@ class KindPlan:
     @property
     def case(self) -> Case | None:
         """The saved case of the kind, None without one."""
-        return self.entry.case if self.entry else None
+        return self.saved.case if self.saved else None
+
+    @property
+    def saved(self) -> SavedCase | None:
+        """The same with its file."""
+        return self.kind.shown_case
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,76 +75,57 @@ class KindPage:
     other: Fact | None
     flight: ShownFlight
 
+    @property
+    def address(self) -> str:
+        """Where the page lies in the folder of a report."""
+        return page_address(self.name)
 
-def plan_kinds(
-    ledger: Ledger,
-    searches: Sequence[SearchSummary],
-    found: Mapping[str, Any],
-    corpus: Corpus,
-    films: int,
-) -> list[KindPlan]:
+
+def plan_kinds(run: RunRecord, films: int) -> list[KindPlan]:
     """Return the pages of a run, search by search; the most frequent kinds have a film."""
-    plans: list[KindPlan] = []
-    order = [(-kind.count, i, j) for i, s in enumerate(searches) for j, kind in enumerate(s.kinds)]
-    filmed = {(i, j) for _, i, j in sorted(order)[:films]}
-    for i, (search, told) in enumerate(zip(searches, found["searches"], strict=True)):
-        cases = _cases(corpus, search)
-        camera = ledger.facts.camera(search.system)
-        for j, (kind, row) in enumerate(zip(search.kinds, told["signatures"], strict=True)):
-            first = search.flight(kind.first)
-            as_found = task_of(ledger, first, first.scenario, camera)
-            entry = _telling(cases.get(kind.signature, ()), kind)
-            case = _case_task(ledger, entry, as_found) if entry else None
-            task = dataclasses.replace(case or as_found, with_film=(i, j) in filmed)
-            plans.append(
-                KindPlan(
-                    name=page_name(search.system, search.map, kind.signature),
-                    search=search,
-                    kind=kind,
-                    entry=entry,
-                    repeat=row["repeat"],
-                    task=task,
-                    found=as_found if task.sha256 != as_found.sha256 else None,
-                )
+    kinds = [(search, kind) for search in run.searches for kind in search.kinds]
+    frequent = sorted(range(len(kinds)), key=lambda number: -kinds[number][1].count)
+    filmed = {*frequent[:films]}
+    plans = []
+    for number, (search, kind) in enumerate(kinds):
+        as_found = _task(run, search, search.flight(kind.first))
+        task = _case_task(run, search, kind.shown_case) or as_found
+        task = dataclasses.replace(task, with_film=number in filmed)
+        plans.append(
+            KindPlan(
+                name=page_name(search.key.system, search.key.map, search.name, kind.signature),
+                search=search,
+                kind=kind,
+                repeat=repeat_command(run, search, kind),
+                task=task,
+                found=as_found if task.sha256 != as_found.sha256 else None,
             )
+        )
     return plans
 
 
-def _cases(corpus: Corpus, search: SearchSummary) -> dict[str, list[CorpusEntry]]:
-    """Return the saved cases of each ending of a search."""
-    found: dict[str, list[CorpusEntry]] = {}
-    for entry in corpus.entries(search.system):
-        case = entry.case
-        if case is not None and case.scenario.map == search.map:
-            found.setdefault(case.ending, []).append(entry)
-    return found
+def _task(run: RunRecord, search: SearchRecord, flight: LedgerFlight) -> FlightTask:
+    return task_of(flight, run.jobs[flight.id.search], run.ledger, search.camera)
 
 
-def _telling(entries: Sequence[CorpusEntry], kind: ViolationKind) -> CorpusEntry | None:
-    """Return the saved case that tells the cause of a kind; else the first, None without one."""
-    first = entries[0] if entries else None
-    return next((each for each in entries if each.case == kind.case), first)
-
-
-def _case_task(ledger: Ledger, entry: CorpusEntry, as_found: FlightTask) -> FlightTask | None:
-    """Return the flight of a saved case; None if this ledger does not have it."""
-    case = entry.case
-    assert case is not None
-    flight = ledger.queries.flight_with_hash(case.evidence.trajectory_sha256)
-    if flight is None:
+def _case_task(run: RunRecord, search: SearchRecord, saved: SavedCase | None) -> FlightTask | None:
+    """Return the flight of a saved case; None if there is none in the run."""
+    if saved is None or saved.flight is None:
         return None
-    scenario = dump_scenario(case.scenario)
-    task = task_of(ledger, flight, scenario, as_found.camera)
     return dataclasses.replace(
-        task, name=entry.name, policy=case.policy, prevention=case.prevention
+        _task(run, search, saved.flight),
+        name=saved.name,
+        scenario=dump_scenario(saved.case.scenario),
+        policy=saved.case.policy,
+        prevention=saved.case.prevention,
     )
 
 
-def kind_page(plan: KindPlan, flight: ShownFlight, known: bool) -> KindPage:
-    """Return the page of a kind; ``known`` says whether its case is accepted."""
+def kind_page(plan: KindPlan, flight: ShownFlight) -> KindPage:
+    """Return the page of a kind."""
     case, is_case = plan.case, _shows_case(plan)
     story, description = plan.task.result.verdict.story, flight.description
-    if plan.kind.signature.startswith("own:"):
+    if plan.kind.type == "own":
         story = description = plan.kind.story
     if case is not None and is_case:
         description = case.violation.description
@@ -155,7 +137,7 @@ def kind_page(plan: KindPlan, flight: ShownFlight, known: bool) -> KindPage:
         story=story,
         description=description,
         subject=_subject(plan),
-        facts=_facts(plan, flight, known),
+        facts=_facts(plan),
         other=other if plan.found else None,
         title=plan.kind.title,
     )
@@ -200,8 +182,8 @@ def _page(
         title=_capitalised(title) or ending,
         ending=ending if title else "",
         signature=kind.signature,
-        meaning=LEGEND.get(kind.signature.partition(":")[0], ""),
-        where=f"{search.name} on {search.map}",
+        meaning=LEGEND.get(kind.type, ""),
+        where=search.name,
         description=cut_text(description),
         subject=subject,
         facts=tuple(fact for fact in facts if fact[1]),
@@ -215,7 +197,7 @@ def _page(
 
 
 def _shows_case(plan: KindPlan) -> bool:
-    return plan.entry is not None and plan.task.name == plan.entry.name
+    return plan.saved is not None and plan.task.name == plan.saved.name
 
 
 def _subject(plan: KindPlan) -> str:
@@ -239,7 +221,7 @@ def _unusual(task: FlightTask) -> Fact:
     return "Unusual in this flight", text
 
 
-def _facts(plan: KindPlan, flight: ShownFlight, known: bool) -> tuple[Fact, ...]:
+def _facts(plan: KindPlan) -> tuple[Fact, ...]:
     kind, search, case = plan.kind, plan.search, plan.case
     shows_shrunk = case is not None and case.is_shrunk and _shows_case(plan)
     severity = case.severity if case and _shows_case(plan) else plan.task.result.severity
@@ -250,7 +232,7 @@ def _facts(plan: KindPlan, flight: ShownFlight, known: bool) -> tuple[Fact, ...]
     least, _, least_text = kind.least.partition(": ")
     is_told = shows_shrunk or kind.severest == plan.task.name
     seen = in_control_text(kind.in_control, search.random_flights)
-    flights = f"{kind.count} of {len(search.flights)} flights"
+    flights = f"{kind.count} of {search.flown} flights"
     return (
         (label, f"{text} ({means})" if text and means else text),
         (_capitalised(least), "" if is_told else least_text),
@@ -259,22 +241,22 @@ def _facts(plan: KindPlan, flight: ShownFlight, known: bool) -> tuple[Fact, ...]
         ("Preventable?", case.prevention.text if case else ""),
         ("Why it gates nothing", NO_GATE_TEXTS[case.reason] if case and case.reason else ""),
         ("Shrinking removed", case.evidence.removed if case and case.is_shrunk else ""),
-        ("Saved case", _status(case, known) if case else "none in this project"),
+        ("Saved case", _status(plan.saved) if plan.saved else "none in this project"),
     )
 
 
-def _status(case: Case, known: bool) -> str:
-    if case.status == "fixed":
+def _status(saved: SavedCase) -> str:
+    if saved.case.status == "fixed":
         return "fixed: it must pass"
-    if not case.gates:
-        return "known, gates nothing" if known else "new, gates nothing"
-    return "known: expected to fail until it is fixed" if known else "new: fails the tests"
+    if not saved.case.gates:
+        return "known, gates nothing" if saved.known else "new, gates nothing"
+    return "known: expected to fail until it is fixed" if saved.known else "new: fails the tests"
 
 
 def _commands(plan: KindPlan) -> tuple[Fact, ...]:
     commands = [("the first flight, as found", plan.repeat)]
-    if plan.entry is not None:
-        file = shown_file(plan.entry.path)
+    if plan.saved is not None:
+        file = shown_file(plan.saved.path)
         commands.insert(0, ("the saved case", command("garl", "cases", "replay", file)))
     return tuple(commands)
 

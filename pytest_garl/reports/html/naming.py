@@ -6,6 +6,8 @@ import hashlib
 import re
 from pathlib import Path
 
+from pytest_garl.execution.facts import SearchKey
+
 _UNSAFE = re.compile(r"[^A-Za-z0-9]+")
 GENERATOR = "pytest-garl report"
 """The generator that each page names, by which a report is known as one."""
@@ -17,11 +19,17 @@ STILLS = "stills"
 _MOST_CHARS = 60
 
 
-def page_name(system: str, map: str, signature: str) -> str:
-    """Return the name of a kind's page without ending, the same for the same kind."""
-    words = f"{system.split(':')[-1]}-{map}-{signature}"
-    safe = _UNSAFE.sub("-", words).strip("-")[:_MOST_CHARS].rstrip("-")
-    digest = hashlib.sha256(f"{system}\n{map}\n{signature}".encode()).hexdigest()
+def page_name(system: str, map: str, search: str, signature: str) -> str:
+    """Return the name of a kind's page without ending, the same for the same kind.
+
+    ``search`` is what texts call the search that found it.
+    """
+    key = SearchKey(system=system, map=map)
+    words, identity = f"{key.class_name}-{map}", [system, map, signature]
+    if search != key.place:
+        words, identity = search, [*identity, search]
+    safe = _UNSAFE.sub("-", f"{words}-{signature}").strip("-")[:_MOST_CHARS].rstrip("-")
+    digest = hashlib.sha256("\n".join(identity).encode()).hexdigest()
     return f"{safe}-{digest[:6]}"
 
 

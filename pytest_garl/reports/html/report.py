@@ -1,4 +1,4 @@
-"""Write the report of a run as a folder of pages, from its ledger and its flights' records."""
+"""Write the report of a run as a folder of pages, with its flights from their records."""
 
 from __future__ import annotations
 
@@ -7,21 +7,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pytest_garl.cases.corpus import Corpus
-from pytest_garl.errors import GarlError, LedgerError
-from pytest_garl.execution.stored_ledger import checked_ledger
+from pytest_garl.errors import GarlError
 from pytest_garl.reports.film.encoder import program
 from pytest_garl.reports.html import MOST_FILMS
 from pytest_garl.reports.html.flight_task import ShownFlight
 from pytest_garl.reports.html.folder import check_target, new_folder
 from pytest_garl.reports.html.kind_page import KindPlan, found_page, kind_page, plan_kinds
-from pytest_garl.reports.html.naming import INDEX, page_address, still_address
+from pytest_garl.reports.html.naming import INDEX, still_address
 from pytest_garl.reports.html.page_workers import shown_flights
 from pytest_garl.reports.html.pictures import picture_bytes
 from pytest_garl.reports.html.rendering import render_comparison, render_index, render_kind
 from pytest_garl.reports.html.run_page import RunPage, run_page
 from pytest_garl.reports.run_comparison import RunComparison
-from pytest_garl.reports.run_report import run_report_of, summaries_of
+from pytest_garl.reports.run_record import RunRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,49 +37,38 @@ class WrittenReport:
 
 
 def write_html_report(
-    ledger: Path,
+    run: RunRecord,
     out: Path,
-    corpus: Corpus,
     *,
     films: int = MOST_FILMS,
     workers: int | None = None,
     on_done: Callable[[int], None] = lambda done: None,
 ) -> WrittenReport:
-    """Write the report of a ledger into the folder ``out``, whole or not at all.
+    """Write the report of a run into the folder ``out``, whole or not at all.
 
     ``films`` kinds have a film, the most frequent ones, if there is an encoder; ``workers``
-    processes draw, by default one per core.  Raises LedgerError for a ledger that is missing,
-    damaged or of another version, SavingError if ``out`` cannot be written or holds anything but a
-    report.
+    processes draw, by default one per core.  Raises SavingError if ``out`` cannot be written or
+    holds anything but a report.
     """
     check_target(out)
-    if not ledger.is_file():
-        raise LedgerError(
-            f"there is no ledger at {ledger}; run a search first, or name the ledger of one"
-        )
     no_encoder = _no_encoder() if films else ""
-    with checked_ledger(ledger) as opened:
-        searches = summaries_of(opened, corpus)
-        found = run_report_of(opened, ledger, corpus)
-        plans = plan_kinds(opened, searches, found, corpus, 0 if no_encoder else films)
+    plans = plan_kinds(run, 0 if no_encoder else films)
     tasks = [task for plan in plans for task in (plan.task, plan.found) if task is not None]
     flights = iter(shown_flights(tasks, workers or _cores(), on_done))
     shown = [(plan, next(flights), next(flights) if plan.found else None) for plan in plans]
-    accepted = {entry.path for entry in corpus.all_entries() if corpus.is_accepted(entry)}
     notes = _notes([flight for _, *both in shown for flight in both if flight], no_encoder, plans)
     with new_folder(out) as folder:
         pages = []
         for plan, flight, as_found in shown:
-            known = plan.entry is not None and plan.entry.path in accepted
-            page = kind_page(plan, flight, known)
+            page = kind_page(plan, flight)
             pages.append((plan, page))
-            _write(folder / page_address(page.name), render_kind(page))
+            _write(folder / page.address, render_kind(page))
             for still in (each for each in flight.stills if each.shows_cause):
                 (folder / still_address(page.name)).write_bytes(picture_bytes(still.picture))
             if as_found is not None:
                 other = found_page(plan, as_found)
-                _write(folder / page_address(other.name), render_kind(other))
-        index = run_page(found, searches, pages, notes)
+                _write(folder / other.address, render_kind(other))
+        index = run_page(run, pages, notes)
         _write(folder / INDEX, render_index(index))
     return WrittenReport(
         index=out / INDEX,

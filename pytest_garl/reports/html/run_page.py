@@ -2,47 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 from pytest_garl.reports.causes import counted_causes
 from pytest_garl.reports.html.charts import (
     Plot,
+    Segment,
     kinds_over_flights,
+    outcome_bar,
     violations_over_flights,
 )
-from pytest_garl.reports.html.flight_task import ShownFlight
 from pytest_garl.reports.html.kind_page import Fact, KindPage, KindPlan
-from pytest_garl.reports.html.naming import page_address, shown_file, still_address
-from pytest_garl.reports.html.search_card import SearchCard, cost_rows, domain_rows, search_card
-from pytest_garl.reports.search_summary import LEGEND, SearchSummary, by_cause
-from pytest_garl.reports.shares_text import in_control_text, kinds_lines, percent
+from pytest_garl.reports.html.naming import shown_file, still_address
+from pytest_garl.reports.run_record import (
+    NO_PHASE,
+    PHASES,
+    KindRecord,
+    RunRecord,
+    SearchRecord,
+    by_cause,
+)
+from pytest_garl.reports.run_text import (
+    LEGEND,
+    PAPER_DEFINITION,
+    counts_text,
+    in_control_text,
+    kinds_lines,
+    limits_text,
+    percent,
+)
 
-PHASES = ("take-off", "transit", "search", "approach", "descent", "last-metre", "standing")
-"""Phases of a landing (``verdicts/evidence.py``), in its order."""
-NO_PHASE = "not of a phase"
 MOST_THUMBNAILS = 24
 """So that the index stays below 300 kB: a small picture takes some 6 kB."""
 MOST_FINDINGS = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SearchCard:
+    """A search: how its flights ended, and its figures."""
+
+    search: SearchRecord
+    bar: tuple[Segment, ...]
+    violating: str
+    figures: tuple[Fact, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class KindRow:
-    """A kind of violation in the index, with the addresses of its page and its picture's file.
+    """A kind of violation in the index, with its page and the address of its picture's file.
 
     ``still`` is empty if there is no picture.
     """
 
-    address: str
-    still: str
-    title: str
-    ending: str
-    signature: str
-    where: str
-    count: int
+    kind: KindRecord
+    page: KindPage
     flown: int
+    still: str
     facts: tuple[str, ...]
     tag: str
     thumbnail: str
@@ -84,70 +100,60 @@ class RunPage:
 
 
 def run_page(
-    found: Mapping[str, Any],
-    searches: Sequence[SearchSummary],
-    shown: Sequence[tuple[KindPlan, KindPage]],
-    missing: Sequence[str],
+    run: RunRecord, shown: Sequence[tuple[KindPlan, KindPage]], missing: Sequence[str]
 ) -> RunPage:
-    """Return the index of a run: ``found`` is its report as data, ``shown`` its pages in order."""
+    """Return the index of a run; ``shown`` are its pages in order."""
     # Over all searches, frequent ones first.
     shown = by_cause(sorted(shown, key=_order), lambda each: each[0].kind)
-    kinds = [_kind(plan, page, index) for index, (plan, page) in enumerate(shown)]
-    flights = found["flights"]
-    violating = sum(each.violating for each in searches)
-    not_by_chance = {page.name for plan, page in shown if plan.kind.in_control == 0}
+    kinds = tuple(_kind(plan, page, index) for index, (plan, page) in enumerate(shown))
     return RunPage(
-        title=_title(searches, len(kinds), violating),
-        subtitle=_subtitle(found),
-        problem=_problem(found),
-        numbers=_numbers(searches, flights["flown"], violating, len(kinds)),
-        searches=tuple(
-            search_card(search, row["wanted"])
-            for search, row in zip(searches, found["searches"], strict=True)
-        ),
-        kinds=tuple(kinds),
-        not_by_chance=tuple(row for row in kinds if Path(row.address).stem in not_by_chance),
-        compared=any(plan.kind.in_control is not None for plan, _ in shown),
-        control=tuple(
-            (f"{each.name} on {each.map}", text) for each in searches for text in kinds_lines(each)
-        ),
-        kinds_plot=kinds_over_flights(searches),
-        violations_plot=violations_over_flights(searches),
+        title=_title(run),
+        subtitle=_subtitle(run),
+        problem=_problem(run),
+        numbers=_numbers(run),
+        searches=tuple(search_card(search) for search in run.searches),
+        kinds=kinds,
+        not_by_chance=tuple(row for row in kinds if row.kind.in_control == 0),
+        compared=any(row.kind.in_control is not None for row in kinds),
+        control=tuple((each.name, text) for each in run.searches for text in kinds_lines(each)),
+        kinds_plot=kinds_over_flights(run.searches),
+        violations_plot=violations_over_flights(run.searches),
         phases=(*PHASES, NO_PHASE),
-        archive=_archive(searches),
+        archive=_archive(run),
         findings=tuple(
-            (each.signature, f"{search.name} on {search.map}", each.count, each.headline)
-            for search in searches
+            (each.signature, search.name, each.count, each.headline)
+            for search in run.searches
             for each in search.findings
         )[:MOST_FINDINGS],
-        cost=cost_rows(found),
-        domain=domain_rows(searches, found),
+        cost=cost_rows(run),
+        domain=domain_rows(run),
         cases=tuple(
             (
-                _file(case["file"]),
-                case["signature"],
-                case["status"],
-                "yes" if case["known"] else "no",
+                shown_file(each.path),
+                each.case.violation.signature,
+                each.case.status,
+                "yes" if each.known else "no",
             )
-            for case in found["cases"]
+            for each in run.cases
         ),
-        origin=_origin(found),
+        origin=_origin(run),
         notes=tuple(missing),
     )
 
 
-def _title(searches: Sequence[SearchSummary], kinds: int, violating: int) -> str:
-    flown = sum(len(each.flights) for each in searches)
-    if not flown:
+def _title(run: RunRecord) -> str:
+    if not run.flown:
         return "No flights yet"
-    names = list(dict.fromkeys(each.name for each in searches))
+    names = list(dict.fromkeys(each.key.class_name for each in run.searches))
     who = names[0] if len(names) == 1 else f"{len(names)} landing systems"
-    if not violating:
-        return f"{who}: no violation in {flown} flights"
-    ways = "one way" if kinds == 1 else f"{kinds} ways"
-    causes = counted_causes([kind.case for each in searches for kind in each.kinds])
+    if not run.violating:
+        return f"{who}: no violation in {run.flown} flights"
+    ways = "one way" if len(run.kinds) == 1 else f"{len(run.kinds)} ways"
+    causes = counted_causes([kind.case for kind in run.kinds])
     with_causes = f", {causes}" if causes else ""
-    return f"{who}: {violating} of {flown} flights violate something, in {ways}{with_causes}"
+    return (
+        f"{who}: {run.violating} of {run.flown} flights violate something, in {ways}{with_causes}"
+    )
 
 
 def _order(shown: tuple[KindPlan, KindPage]) -> tuple[int, str, str]:
@@ -155,22 +161,21 @@ def _order(shown: tuple[KindPlan, KindPage]) -> tuple[int, str, str]:
     return -plan.kind.count, plan.kind.signature, page.where
 
 
-def _subtitle(found: Mapping[str, Any]) -> str:
-    run, began = found["run"], str(found["time"]["began"] or "")
-    day = f"{began[:16].replace('T', ' ')} UTC, " if began else ""
+def _subtitle(run: RunRecord) -> str:
+    day = f"{run.began[:16].replace('T', ' ')} UTC, " if run.began else ""
+    options = run.options
     return (
-        f"{day}method {run['method']}, budget {run['budget']} per system and map, "
-        f"seed {run['seed']}"
+        f"{day}method {options.method}, budget {options.budget} per system and map, "
+        f"seed {options.seed}"
     )
 
 
-def _problem(found: Mapping[str, Any]) -> str:
-    if found["complete"]:
+def _problem(run: RunRecord) -> str:
+    if run.complete:
         return ""
-    flights = found["flights"]
-    if flights["flown"] < flights["wanted"]:
+    if run.flown < run.wanted:
         return (
-            f"This run is not finished: {flights['flown']} of {flights['wanted']} flights. The "
+            f"This run is not finished: {run.flown} of {run.wanted} flights. The "
             "same pytest command with --garl-resume goes on."
         )
     return (
@@ -179,23 +184,14 @@ def _problem(found: Mapping[str, Any]) -> str:
     )
 
 
-def _numbers(
-    searches: Sequence[SearchSummary], flown: int, violating: int, kinds: int
-) -> tuple[Fact, ...]:
-    landed = sum(each.count("landed") for each in searches)
-    needless = sum(
-        each.without_landing(outcome)["needless"]
-        for each in searches
-        for outcome in ("gave_up", "not_landed")
-    )
-    crashes = sum(sum(each.crashes.values()) for each in searches)
+def _numbers(run: RunRecord) -> tuple[Fact, ...]:
     return (
-        ("flights", str(flown)),
-        ("landed", _share(landed, flown)),
-        ("violate something", _share(violating, flown)),
-        ("did not land, needlessly", _share(needless, flown)),
-        ("software crashes", str(crashes)),
-        ("kinds of violation", str(kinds)),
+        ("flights", str(run.flown)),
+        ("landed", _share(run.landed, run.flown)),
+        ("violate something", _share(run.violating, run.flown)),
+        ("did not land, needlessly", _share(run.needless, run.flown)),
+        ("software crashes", str(run.crashes)),
+        ("kinds of violation", str(len(run.kinds))),
     )
 
 
@@ -203,9 +199,83 @@ def _share(count: int, total: int) -> str:
     return percent(count, total) if total else "–"
 
 
+def search_card(search: SearchRecord) -> SearchCard:
+    """Return how the flights of a search ended."""
+    total = search.flown
+    low, high = search.violating_interval
+    figures = [
+        ("landed", _of(search.landed, total)),
+        (PAPER_DEFINITION, _of(search.violating_by_the_paper, total)),
+        ("gave up", counts_text(search.gave_up)),
+        ("ran out of time", counts_text(search.not_landed)),
+        ("crashed", counts_text(search.crashes)),
+        ("inconclusive", str(len(search.inconclusive) or "")),
+    ]
+    distance_m, time_s = search.landing_distance_m, search.landing_time_s
+    if distance_m and time_s:
+        figures += [
+            (
+                "distance from the marker",
+                f"median {distance_m.median:.2f} m, worst {distance_m.worst:.2f} m",
+            ),
+            ("time to the touchdown", f"median {time_s.median:.1f} s, worst {time_s.worst:.1f} s"),
+        ]
+    return SearchCard(
+        search=search,
+        bar=outcome_bar(search),
+        violating=(
+            f"{percent(search.violating, total)} violate something "
+            f"(95 %: {100 * low:.1f} to {100 * high:.1f} %)"
+        ),
+        figures=tuple(figure for figure in figures if figure[1]),
+    )
+
+
+def _of(count: int, total: int) -> str:
+    return f"{count} ({percent(count, total)})"
+
+
+def cost_rows(run: RunRecord) -> tuple[Fact, ...]:
+    """Return what a run cost."""
+    costs, in_all, idle = run.costs, run.flown + run.costs.beside, run.costs.idle_share
+    flying_s = costs.flying_s
+    return (
+        ("flights of the search", f"{run.flown} of {run.wanted}"),
+        ("flights to repeat, confirm, shrink and tell causes apart", str(costs.beside)),
+        ("flown again after a time-out or a kill", str(costs.flown_again)),
+        ("time that workers spent on all flights", _duration(flying_s)),
+        ("a flight on average", f"{flying_s / in_all:.1f} s" if in_all and flying_s else ""),
+        ("workers idle", "" if idle is None else f"{100 * idle:.0f} %"),
+        ("began", _utc(run.began)),
+        ("ended", _utc(run.ended)),
+    )
+
+
+def _utc(text: str | None) -> str:
+    return f"{text[:19].replace('T', ' ')} UTC" if text else ""
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+
+
+def domain_rows(run: RunRecord) -> tuple[Fact, ...]:
+    """Return domain, NPC policy and limits of the searches; those that share them in one row."""
+    rows: dict[str, list[str]] = {}
+    for search in run.searches:
+        domain = search.key.domain or str(run.options.domain or "")
+        limits = "; ".join(limits_text(each) for each in search.limits)
+        text = f"domain {domain}, NPCs {' and '.join(search.npcs)}; limits {limits}"
+        rows.setdefault(text, []).append(search.name)
+    if len(rows) == 1:
+        return tuple(("all flights", text) for text in rows)
+    return tuple((", ".join(names), text) for text, names in rows.items())
+
+
 def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
-    kind, search = plan.kind, plan.search
-    case = plan.case
+    kind, search, case = plan.kind, plan.search, plan.case
     facts = [
         kind.least,
         in_control_text(kind.in_control, search.random_flights),
@@ -216,32 +286,18 @@ def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
     if case and case.reason:
         tag = f"{tag}, gates nothing: {case.reason}"
     return KindRow(
-        address=page_address(plan.name),
+        kind=kind,
+        page=page,
+        flown=search.flown,
         still=still_address(plan.name) if page.flight.stills else "",
-        title=page.title,
-        ending=page.ending,
-        signature=kind.signature,
-        where=page.where,
-        count=kind.count,
-        flown=len(search.flights),
         facts=tuple(fact for fact in facts if fact),
         tag=tag,
-        thumbnail=_thumbnail(page.flight, index),
+        thumbnail=page.flight.thumbnail if index < MOST_THUMBNAILS else "",
     )
 
 
-def _thumbnail(flight: ShownFlight, index: int) -> str:
-    return flight.thumbnail if index < MOST_THUMBNAILS else ""
-
-
-def _archive(searches: Sequence[SearchSummary]) -> tuple[ArchiveRow, ...]:
-    counts: dict[str, dict[str, int]] = {}
-    for search in searches:
-        for kind in search.kinds:
-            parts = kind.signature.split(":")
-            phase = next((part for part in parts[1:] if part in PHASES), NO_PHASE)
-            row = counts.setdefault(parts[0], {})
-            row[phase] = row.get(phase, 0) + kind.count
+def _archive(run: RunRecord) -> tuple[ArchiveRow, ...]:
+    counts = run.archive
     most = max((count for row in counts.values() for count in row.values()), default=1)
     return tuple(
         ArchiveRow(
@@ -261,15 +317,11 @@ def _shade(count: int, most: int) -> int:
     return 0 if not count else min(4, 1 + int(4 * count / (most + 1)))
 
 
-def _origin(found: Mapping[str, Any]) -> tuple[Fact, ...]:
-    ledger = Path(found["ledger"])
+def _origin(run: RunRecord) -> tuple[Fact, ...]:
+    ledger = run.ledger
     return (
-        ("results, SHA-256", found["results_sha256"]),
-        ("pytest-garl", str(found["pytest_garl"])),
-        ("Python", str(found["run"]["python"] or "")),
+        ("results, SHA-256", run.results_sha256),
+        ("pytest-garl", run.version),
+        ("Python", run.options.python or ""),
         ("ledger", f"{ledger.absolute().parent.name}/{ledger.name}"),
     )
-
-
-def _file(path: str) -> str:
-    return shown_file(Path(path))

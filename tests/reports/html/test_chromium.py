@@ -10,6 +10,7 @@ import pytest
 from pytest_garl.cases.corpus import Corpus
 from pytest_garl.flight.flight import Crash
 from pytest_garl.reports.html.report import write_html_report
+from pytest_garl.reports.run_reading import read_run
 from tests.reports.html.test_rendering import HOSTILE
 from tests.reports.html.test_report import lost
 from tests.support.chromium import PROGRAM, Browser, browser
@@ -52,7 +53,8 @@ def report(tmp_path_factory: pytest.TempPathFactory, video: Video) -> Path:
     )
     results = [lost(), crashed, flight_result(completed=True), lost()]
     path = write_ledger(folder, [Flown(result=each, flight=video.flight) for each in results])
-    write_html_report(path, folder / "report", Corpus(folder / "cases"), films=1, workers=1)
+    run = read_run(path, Corpus(folder / "cases"))
+    write_html_report(run, folder / "report", films=1, workers=1)
     return folder / "report"
 
 

@@ -8,12 +8,11 @@ import pytest
 
 from pytest_garl.cases.corpus import Corpus
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.stored_ledger import checked_ledger
 from pytest_garl.reports.html import page_workers
 from pytest_garl.reports.html.flight_task import FlightTask, shown_flight
 from pytest_garl.reports.html.kind_page import plan_kinds
 from pytest_garl.reports.html.page_workers import shown_flights
-from pytest_garl.reports.run_report import run_report_of, summaries_of
+from pytest_garl.reports.run_reading import read_run
 from tests.reports.html.test_report import lost
 from tests.support.report_ledgers import Flown, write_ledger
 from tests.support.videos import Video
@@ -25,11 +24,8 @@ def tasks(tmp_path: Path, video: Video) -> list[FlightTask]:
         Flown(result=lost(signature=f"II:lost:{index}"), flight=video.flight) for index in range(5)
     ]
     path = write_ledger(tmp_path, flown)
-    corpus = Corpus(tmp_path / "cases")
-    with checked_ledger(path) as ledger:
-        searches = summaries_of(ledger, corpus)
-        found = run_report_of(ledger, path, corpus)
-        return [plan.task for plan in plan_kinds(ledger, searches, found, corpus, 0)]
+    run = read_run(path, Corpus(tmp_path / "cases"))
+    return [plan.task for plan in plan_kinds(run, 0)]
 
 
 def test_processes_show_what_this_one_does_in_order(tasks: list[FlightTask]) -> None:

@@ -20,6 +20,7 @@ from pytest_garl.flight.flight import Crash
 from pytest_garl.reports.html.index_markdown import index_parts
 from pytest_garl.reports.html.moments import moments_of, telling_moment
 from pytest_garl.reports.html.report import WrittenReport, write_html_report
+from pytest_garl.reports.run_reading import read_run
 from pytest_garl.verdicts.evidence import Evidence
 from tests.reports.html.test_rendering import HOSTILE, Elements
 from tests.support.ffmpeg import hide_encoders
@@ -44,7 +45,8 @@ def lost(**fields: Any) -> Any:
 def write(folder: Path, ledger: Path | None = None, **more: Any) -> WrittenReport:
     corpus = Corpus(folder / "scenarios" / "regressions")
     path = ledger or folder / ".garl" / "ledger.sqlite"
-    return write_html_report(path, folder / "report", corpus, **({"films": 0} | more))
+    run = read_run(path, corpus, checked=True)
+    return write_html_report(run, folder / "report", **({"films": 0} | more))
 
 
 def pages(folder: Path) -> dict[str, str]:
@@ -105,7 +107,7 @@ def test_each_kind_has_a_picture_for_the_summary_of_a_build(run: Path) -> None:
     assert picture.shape == (300, 400, 3)
     url = "https://example.org/report"
     shown = "\n".join(index_parts(written.page, written.index.parent, url))
-    assert f'<a href="{url}/{kind.address}"><img src="{url}/{kind.still}"' in shown
+    assert f'<a href="{url}/{kind.page.address}"><img src="{url}/{kind.still}"' in shown
     assert "data:" not in shown
     unpublished = "\n".join(index_parts(written.page, written.index.parent, ""))
     assert "<img" not in unpublished

@@ -6,12 +6,14 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin.summary import search_table
-from pytest_garl.reports.search_summary import SearchSummary, Spread, _kinds, legend
-from pytest_garl.reports.shares_text import headline_shares, share_lines
+from pytest_garl.reports.run_reading import kinds_of
+from pytest_garl.reports.run_record import SearchRecord, Spread
+from pytest_garl.reports.run_text import headline_shares, legend, share_lines
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Finding, Limits
 from tests.support.results import crash, flight_result
 
@@ -33,9 +35,9 @@ RESULTS = (
 )
 
 
-def summary(
+def record(
     results: tuple[FlightResult, ...], limits: Limits | None = None, violating: int = 0
-) -> SearchSummary:
+) -> SearchRecord:
     flights = tuple(
         LedgerFlight(
             id=FlightId(search="s", map="lawn", slot=Slot(generation=0, index=index)),
@@ -51,20 +53,20 @@ def summary(
         for each in flights
         for finding in each.result.verdict.findings
     }
-    return SearchSummary(
-        system="my_landing:Mine",
-        map="lawn",
-        files=("test_it.py",),
+    key = SearchKey(system="my_landing:Mine", map="lawn", tests=("test_it.py::test_it",))
+    return SearchRecord(
+        key=key,
+        name=key.place,
         flights=flights,
         kinds=(),
         violating=violating,
-        findings=_kinds(findings),
+        findings=kinds_of(findings),
         limits=(limits or Limits(),),
     )
 
 
 def test_landed_flights_come_first_and_each_reason_has_its_share() -> None:
-    search = summary(RESULTS, violating=2)
+    search = record(RESULTS, violating=2)
     assert headline_shares(search) == "8 flown, landed 25.0 %, violations 25.0 % [3.2, 65.1]"
     assert share_lines(search)[:3] == [
         "by the paper's definition, which counts not landing: violations 62.5 %",
@@ -75,22 +77,22 @@ def test_landed_flights_come_first_and_each_reason_has_its_share() -> None:
 
 
 def test_search_without_landing_says_so() -> None:
-    lines = share_lines(summary(RESULTS[2:]))
+    lines = share_lines(record(RESULTS[2:]))
     assert "landed 0 %: no flight landed, so nothing is known of its landings" in lines
 
 
 def test_landings_beyond_the_limit_are_told_apart() -> None:
     off = flight_result(outcome="landed", signature="off:seen", primary="distance")
     assert "landed 100.0 %, within the limit of distance 50.0 %" in headline_shares(
-        summary((RESULTS[0], off), violating=1)
+        record((RESULTS[0], off), violating=1)
     )
 
 
 def test_only_limits_that_are_not_the_default_ones_are_shown() -> None:
-    assert share_lines(summary(RESULTS, PAPER_LIMITS))[-1] == (
+    assert share_lines(record(RESULTS, PAPER_LIMITS))[-1] == (
         'limits: distance 1.5 m, time 120 s, abort="violation"'
     )
-    assert not any(line.startswith("limits") for line in share_lines(summary(RESULTS)))
+    assert not any(line.startswith("limits") for line in share_lines(record(RESULTS)))
 
 
 def test_spread_of_nothing_is_none() -> None:
@@ -108,7 +110,7 @@ def test_findings_before_another_event_follow_the_violations(
         time_s=20.0,
         story="Came down 4.8 m north of the marker, which had been in view before.",
     )
-    search = summary((RESULTS[0], flight_result("IV:dog:descent:seen", findings=(finding,))))
+    search = record((RESULTS[0], flight_result("IV:dog:descent:seen", findings=(finding,))))
     lines = search_table(search, pytestconfig, 120)
     start = lines.index("  also noted, no test fails for it:")
     assert lines[start + 1].split()[:2] == ["1", "off:descending-elsewhere"]
@@ -129,5 +131,5 @@ def test_never_giving_up_where_nobody_could_land_is_not_needless() -> None:
     }
     unseen = flight_result(**late, story="Not landed. Nobody could see the marker: 0.8 s.")
     blocked = flight_result(**late, story="Not landed. The marker was blocked: 2 s.")
-    told = summary((unseen, unseen, blocked)).without_landing("not_landed")
+    told = record((unseen, unseen, blocked)).not_landed
     assert told == {"needless": 0, "excused": 2, "blocked": 1}

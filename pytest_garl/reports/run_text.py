@@ -1,35 +1,97 @@
-"""The shares of a search in words, for the terminal and ``garl report``."""
+"""The figures of a run in words that several outputs share; ``garl report`` is all of them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from pytest_garl.messages import command
+from pytest_garl.reports.causes import counted_causes
 from pytest_garl.reports.control_arm import LEAST_FLIGHTS, ControlArm
-from pytest_garl.reports.search_summary import WHY_NO_LANDING, SearchSummary
-from pytest_garl.verdicts.paper_metrics import top_k
-from pytest_garl.verdicts.statistics import share_interval
+from pytest_garl.reports.run_record import WHY_NO_LANDING, KindRecord, RunRecord, SearchRecord
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
 from pytest_garl.verdicts.wording import decided_text
 
 PAPER_DEFINITION = "by the paper's definition, which counts not landing"
 """How texts call the paper's definition: its type II is "no landing occurs"."""
+LEGEND = {
+    "I": "came down off the marker, on something else or on nothing",
+    "II": "did not land: the marker could never be read, was lost, or was readable to the end",
+    "III": "hit a fixed body",
+    "IV": "hit a moving body",
+    "V": "Python error, death or hang of the landing system",
+    "late": "landed too late, or let the time run out in sight of the marker, on the ground or "
+    "without giving up",
+    "off": "came down too far from the marker, up to 1.5 m",
+    "hard": "touched down too fast or tilted",
+    "slid": "moved on over the ground after its touchdown",
+    "abort": 'gave up where nobody could land, with limits(abort="violation")',
+    "own": "an assertion of a test",
+    "slow": "took more than three times as long as a nominal landing",
+    "lost-while-detectable": "did not report the marker while it could be read",
+}
+"""Meanings of the types of violations and findings: a signature's part before the first colon."""
 
 
-def headline_shares(search: SearchSummary) -> str:
+def run_text(run: RunRecord) -> str:
+    """Return a run in short, for ``garl report``."""
+    lines = []
+    for search in run.searches:
+        late = search.not_landed
+        lines.append(
+            f"{search.name}: {search.flown} of {search.wanted} flown, "
+            f"{search.landed} landed, {search.violating} violate "
+            f"({search.violating_by_the_paper} {PAPER_DEFINITION}), "
+            f"gave up: {counts_text(search.gave_up)}"
+            f"{f'; ran out of time: {counts_text(late)}' if any(late.values()) else ''}"
+        )
+        lines += [f"  {text}" for text in [control_text(search)] if text]
+        lines += [line for kind in search.kinds for line in _kind_lines(run, search, kind)]
+    return "\n".join([*lines, ""]) if lines else "no flights yet\n"
+
+
+def _kind_lines(run: RunRecord, search: SearchRecord, kind: KindRecord) -> list[str]:
+    title, *ending = [text for text in (kind.title, kind.headline) if text] or [""]
+    least = ""
+    if kind.case is not None and kind.case.severity.text:
+        least = f"at the least: {kind.case.severity.text}"
+    elif kind.case is None and kind.severity is not None and kind.severity.unusual:
+        least = f"unusual in the mildest of them: {kind.severity.unusual}"
+    seen = in_control_text(kind.in_control, search.random_flights)
+    texts = (*ending, least, seen, repeat_command(run, search, kind))
+    return [
+        f"  {kind.count:4d}  {kind.signature}: {title}",
+        *(f"        {text}" for text in texts if text),
+    ]
+
+
+def repeat_command(run: RunRecord, search: SearchRecord, kind: KindRecord) -> str:
+    """Return the command that repeats the first flight of a kind, called beside the ledger."""
+    folder = run.ledger.parent.name
+    words = ["pytest", *search.key.files, f"--garl-repeat={kind.first}"]
+    return command(*words, *(() if folder == ".garl" else ("-o", f"garl_dir={folder}")))
+
+
+def counts_text(counts: Mapping[Any, int]) -> str:
+    """Return numbers with their names: ``needless 3, excused 0``."""
+    return ", ".join(f"{name} {count}" for name, count in counts.items())
+
+
+def headline_shares(search: SearchRecord) -> str:
     """Return such as ``60 flown, landed 55.0 %, violations 40.0 % [27.6, 53.5]``."""
-    total = len(search.flights)
-    low, high = share_interval(search.violating, total)
-    landed = search.count("landed")
-    shares = [f"{total} flown", f"landed {percent(landed, total)}"]
-    if search.completed != landed:
+    total = search.flown
+    low, high = search.violating_interval
+    shares = [f"{total} flown", f"landed {percent(search.landed, total)}"]
+    if search.completed != search.landed:
         shares.append(f"within the limit of distance {percent(search.completed, total)}")
     violations = percent(search.violating, total)
     return ", ".join([*shares, f"violations {violations} [{100 * low:.1f}, {100 * high:.1f}]"])
 
 
-def share_lines(search: SearchSummary) -> list[str]:
+def share_lines(search: SearchRecord) -> list[str]:
     """Return the other shares: the paper's definition, no landing, crashes, figures, limits."""
-    total = len(search.flights)
-    paper = percent(search.violating_by_the_paper, total)
-    tenth = top_k(search.verdicts)
+    paper = percent(search.violating_by_the_paper, search.flown)
+    tenth = search.tenth_violation
     found = f", the tenth in flight {tenth}" if tenth else ""
     return [
         f"{PAPER_DEFINITION}: violations {paper}{found}",
@@ -40,21 +102,22 @@ def share_lines(search: SearchSummary) -> list[str]:
     ]
 
 
-def kinds_lines(search: SearchSummary) -> list[str]:
+def kinds_lines(search: SearchRecord) -> list[str]:
     """Return how diverse the violations are, and what random flights found beside the search."""
     number, effective = len(search.kinds), search.effective_kinds
-    causes = f", {search.causes}" if search.causes else ""
+    known = counted_causes([kind.case for kind in search.kinds])
+    causes = f", {known}" if known else ""
     diverse = (
         f"{number} kinds of violation{causes}, as diverse as {effective:.1f} equally frequent ones"
     )
     return [text for text in (diverse if number > 1 else "", control_text(search)) if text]
 
 
-def control_text(search: SearchSummary) -> str:
+def control_text(search: SearchRecord) -> str:
     """Return what random flights found, and as many later ones; empty without a control arm."""
     if search.control is None:
         return ""
-    own = any(kind.signature.startswith("own:") for kind in search.kinds)
+    own = any(kind.type == "own" for kind in search.kinds)
     remark = " (assertions of your own left out)" if own else ""
     return f"{_compared(search.control)}{remark}"
 
@@ -74,23 +137,21 @@ def percent(count: int, total: int) -> str:
     return f"{100 * count / total:.1f} %"
 
 
-def _no_landing(search: SearchSummary) -> str:
+def _no_landing(search: SearchRecord) -> str:
     """Return the flights that gave up and those without landing, by reason, and the crashes."""
-    total = len(search.flights)
-    gave_up = search.without_landing("gave_up")
+    total, gave_up, not_landed = search.flown, search.gave_up, search.not_landed
     shares = [f"{reason} {percent(gave_up[reason], total)}" for reason in WHY_NO_LANDING]
     parts = [f"gave up: {', '.join(shares)}"]
-    not_landed = search.without_landing("not_landed")
     forced = [f"{why} {not_landed[why]}" for why in WHY_NO_LANDING[1:] if not_landed[why]]
     reasons = f" (of them {', '.join(forced)})" if forced else ""
     parts.append(f"not landed {percent(sum(not_landed.values()), total)}{reasons}")
     parts += [f"{kind} {percent(count, total)}" for kind, count in search.crashes.items()]
-    if inconclusive := search.count("inconclusive"):
-        parts.append(f"inconclusive {inconclusive}")
+    if search.inconclusive:
+        parts.append(f"inconclusive {len(search.inconclusive)}")
     return "; ".join(parts)
 
 
-def _landings(search: SearchSummary) -> str:
+def _landings(search: SearchRecord) -> str:
     """Return the median and the worst figures of the flights that landed, or that none did."""
     distance_m, time_s = search.landing_distance_m, search.landing_time_s
     if distance_m is None or time_s is None:
@@ -129,3 +190,9 @@ def _found(mean: float, between: tuple[int, int], whole: bool) -> str:
         return f"found {between[0]} {'kind' if between[0] == 1 else 'kinds'}"
     low, high = between
     return f"find {mean:.1f} on average, {low} to {high} in 95 % of picks"
+
+
+def legend(kinds: Iterable[KindRecord]) -> str:
+    """Return the meanings of the types of these kinds, in one line."""
+    types = {kind.type for kind in kinds}
+    return "; ".join(f"{name}: {meaning}" for name, meaning in LEGEND.items() if name in types)

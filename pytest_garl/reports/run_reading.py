@@ -1,0 +1,217 @@
+"""Read a run: once from its ledger, with the saved cases of its landing systems."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from types import MappingProxyType
+
+from pytest_garl.cases.case import Case
+from pytest_garl.cases.corpus import Corpus
+from pytest_garl.errors import LedgerError
+from pytest_garl.execution.facts import SearchKey, UserFailure, search_names
+from pytest_garl.execution.job import FlightJob, parse_job
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
+from pytest_garl.execution.severity import Severity
+from pytest_garl.execution.stored_ledger import checked_ledger
+from pytest_garl.reports.control_arm import control_arm, is_control
+from pytest_garl.reports.run_record import (
+    KindRecord,
+    RunCosts,
+    RunOptions,
+    RunRecord,
+    SavedCase,
+    SearchRecord,
+    place_of,
+)
+
+_NONE: Mapping[str, tuple[Severity, str]] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionFindings:
+    """What a session of pytest knows of its run beside the ledger.
+
+    ``cases`` are those that it investigated, saved or not; ``confirming`` is the number of flights
+    that this took.
+    """
+
+    cases: tuple[Case, ...] = ()
+    confirming: int = 0
+
+
+def read_run(path: Path, corpus: Corpus, *, checked: bool = False) -> RunRecord:
+    """Return the run in the ledger at ``path``, finished or not.
+
+    ``checked`` has all of it checked before, which takes as long as reading it.  Raises LedgerError
+    if there is none, or if it is damaged.
+    """
+    if not path.is_file():
+        raise LedgerError(f"there is no ledger at {path}; run a search first")
+    with checked_ledger(path) if checked else contextlib.closing(Ledger(path)) as ledger:
+        return record_of(ledger, corpus)
+
+
+def record_of(ledger: Ledger, corpus: Corpus, session: SessionFindings | None = None) -> RunRecord:
+    """Return the run in an open ledger, with the causes that the saved cases tell.
+
+    A session that has just flown it may know more.
+    """
+    facts, queries = ledger.facts, ledger.queries
+    session = session or SessionFindings()
+    progress, meters = queries.progress(), queries.meters()
+    jobs: dict[str, FlightJob] = {}
+    searches = _searches(ledger, jobs)
+    systems = {search.key.system for search in searches}
+    endings = {(s.key.system, s.key.map, kind.signature) for s in searches for kind in s.kinds}
+    cases = tuple(_saved_cases(ledger, corpus, systems, endings, jobs))
+    return RunRecord(
+        ledger=ledger.path,
+        version=facts.version or version("pytest-garl"),
+        options=RunOptions(**facts.reported),
+        began=facts.began,
+        ended=facts.ended,
+        results_sha256=queries.result_hash(),
+        wanted=sum(each.total for each in progress),
+        flown=sum(each.flown for each in progress),
+        costs=RunCosts(
+            flown_again=int(meters.get("retried", 0)),
+            beside=int(meters.get("on_demand", 0)),
+            twins=facts.twins,
+            confirming=session.confirming,
+            flights=int(meters.get("flights", 0)),
+            flying_s=meters.get("flying_s", 0.0),
+            idle_s=meters.get("idle_s", 0.0),
+        ),
+        searches=tuple(each.with_cases(cases, session.cases) for each in searches),
+        cases=cases,
+        jobs=jobs,
+    )
+
+
+def _searches(ledger: Ledger, jobs: dict[str, FlightJob]) -> list[SearchRecord]:
+    """Return the searches that have flights, and add their jobs to ``jobs``."""
+    noted = ledger.facts.searches
+    flown: dict[SearchKey, list[LedgerFlight]] = {}
+    for flight in ledger.queries.flights():
+        key = noted.get(flight.id.search, SearchKey(system=flight.system, map=flight.id.map))
+        flown.setdefault(key, []).append(flight)
+    names = search_names([*noted.values(), *flown])
+    wanted: Counter[SearchKey] = Counter()
+    for each in ledger.queries.progress():
+        wanted[noted.get(each.search, SearchKey(system=each.system, map=each.map))] += each.total
+    failures = ledger.facts.user_failures
+    method = ledger.facts.method
+    found = []
+    for key, flights in sorted(flown.items()):
+        ids = dict.fromkeys(each.id.search for each in flights)
+        jobs |= {search: parse_job(ledger.job(search) or "") for search in ids}
+        limits = dict.fromkeys(jobs[search].limits for search in ids)
+        npcs = dict.fromkeys(jobs[search].npcs.name for search in ids)
+        search = _search(key, flights, [each for each in failures if each.search in ids], method)
+        found.append(
+            dataclasses.replace(
+                search,
+                name=names[key],
+                wanted=wanted[key],
+                limits=tuple(limits),
+                npcs=tuple(npcs),
+                camera=ledger.facts.camera(key.system),
+            )
+        )
+    return found
+
+
+def _search(
+    key: SearchKey,
+    flights: Sequence[LedgerFlight],
+    user_failures: Iterable[UserFailure],
+    method: str | None,
+) -> SearchRecord:
+    # (slot, story) of all violations, by signature.
+    violations: dict[str, list[tuple[str, str]]] = {}
+    findings: dict[str, list[tuple[str, str]]] = {}
+    for flight in flights:
+        verdict, slot = flight.result.verdict, flight.id.slot_id
+        if verdict.violation:
+            violations.setdefault(verdict.ending, []).append((slot, verdict.story))
+        for finding in verdict.findings:
+            findings.setdefault(finding.signature, []).append((slot, finding.story))
+    for each in sorted(user_failures, key=lambda each: each.slot):
+        violations.setdefault(each.signature, []).append((each.slot, each.message))
+    control = control_arm(method, flights)
+    random = {f.id.slot_id for f in flights if is_control(method, f.id.slot.generation)}
+    compares = control is not None and control.later.flights > 0
+    return SearchRecord(
+        key=key,
+        name=key.place,
+        flights=tuple(flights),
+        kinds=kinds_of(violations, _lowest_severities(flights), random if compares else None),
+        violating=len({slot for items in violations.values() for slot, _ in items}),
+        findings=kinds_of(findings),
+        control=control,
+    )
+
+
+def _saved_cases(
+    ledger: Ledger,
+    corpus: Corpus,
+    systems: Iterable[str],
+    endings: Set[tuple[str, str, str]],
+    jobs: dict[str, FlightJob],
+) -> Iterator[SavedCase]:
+    """Yield the saved cases of systems, and add the jobs of their flights to ``jobs``."""
+    entries = [entry for system in systems for entry in corpus.entries(system)]
+    for entry in sorted(entries, key=lambda entry: entry.path):
+        case = entry.case
+        if case is None:
+            continue
+        flight = None
+        if place_of(case) in endings:
+            flight = ledger.queries.flight_with_hash(case.evidence.trajectory_sha256)
+        if flight is not None:
+            jobs[flight.id.search] = parse_job(ledger.job(flight.id.search) or "")
+        known = corpus.is_accepted(entry)
+        yield SavedCase(path=entry.path, case=case, known=known, flight=flight)
+
+
+def _lowest_severities(flights: Sequence[LedgerFlight]) -> dict[str, tuple[Severity, str]]:
+    """Return the lowest severity of the violations and its first slot, by signature."""
+    lowest: dict[str, tuple[Severity, str]] = {}
+    for flight in flights:
+        result = flight.result
+        if result.verdict.violation and result.severity is not None:
+            known = lowest.get(result.signature)
+            if known is None or result.severity < known[0]:
+                lowest[result.signature] = (result.severity, flight.id.slot_id)
+    return lowest
+
+
+def kinds_of(
+    stories: Mapping[str, Sequence[tuple[str, str]]],
+    severities: Mapping[str, tuple[Severity, str]] = _NONE,
+    random_slots: Set[str] | None = None,
+) -> tuple[KindRecord, ...]:
+    """Return the kinds in (slot, story) by signature, the most frequent first."""
+    kinds = []
+    for signature, items in stories.items():
+        slots = tuple(dict.fromkeys(slot for slot, _ in items))
+        severity, severest = severities.get(signature, (None, ""))
+        in_control = None if random_slots is None else len(random_slots & {*slots})
+        kinds.append(
+            KindRecord(
+                signature=signature,
+                slots=slots,
+                story=items[0][1],
+                severity=severity,
+                severest=severest,
+                in_control=in_control,
+            )
+        )
+    return tuple(sorted(kinds, key=lambda each: (-each.count, each.signature)))
