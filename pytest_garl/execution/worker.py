@@ -5,11 +5,13 @@ The worker's supervisor judges, and never runs a line of the landing system's co
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
 import importlib
 import traceback
 from collections.abc import Callable
 from contextlib import closing
+from gc import collect, freeze
 from os import _exit, getpid, getppid
 from pathlib import Path
 from time import monotonic, sleep
@@ -36,6 +38,8 @@ CLAIM_EVERY_S = 0.02
 """Time between two attempts to claim a slot."""
 _TRUSTED = "pytest_garl."
 """Landing systems of this package leave their process as it was."""
+_TRIM = getattr(ctypes.CDLL(None), "malloc_trim", None)
+"""Only glibc has it."""
 RESTART_S = 1.0
 """How long a used worker waits for a fresh one to take a slot, before it ends to make room."""
 SIMULATOR = "the simulator"
@@ -152,6 +156,8 @@ class Worker:
         cv2.setNumThreads(1)
         cpu_dispatch.check()
         state = ProcessState()
+        # What is there by now stays, so that to collect what a flight leaves takes milliseconds.
+        freeze()
         while (claim := self._wait_for_slot()) is not None:
             try:
                 flown = self._fly(claim)
@@ -206,7 +212,9 @@ class Worker:
             self._prove_simulator(claim)
         try:
             self._monitor.flight_begins(limit_s)
-            return fly_and_save(job, scenario, claim.flight, self._monitor)
+            flown = fly_and_save(job, scenario, claim.flight, self._monitor)
+            give_back_memory()
+            return flown
         except OSError as error:
             # Errors of the landing system are part of its flight; this one is of the record.
             raise LedgerError(f"{job.flights}: {error.strerror or error}") from error
@@ -234,6 +242,18 @@ class Worker:
         except Exception as error:
             raise SimulatorError(failure_text(error, SIMULATOR)) from error
         self._monitor.request(**dataclasses.asdict(flown), proves=True)
+
+
+def give_back_memory() -> None:
+    """Free what a flight has left in cycles, and give the freed pages back to the system.
+
+    A flight's pictures lie in cycles, its own or those of the landing system, which Python would
+    collect some flights later.  The C library keeps freed pages between those in use.  Both
+    together hold up to four times what a flight needs.  It takes 2 to 8 ms.
+    """
+    collect()
+    if _TRIM is not None:
+        _TRIM(0)
 
 
 def _is_permanent(error: Exception) -> bool:
