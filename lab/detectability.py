@@ -1,8 +1,8 @@
 """Calibrates the detectability oracle on painted frames that independent detectors read.
 
 ``python -m lab.detectability`` draws and reads the frames (15 minutes on two cores) unless
-``--frames`` names a file that has them, fits the oracle, and writes its coefficients,
-``docs/detectability.md`` and ``docs/pictures/detectability.png``.
+``--frames`` names a file that has them, fits the oracle, writes its coefficients, and prints how
+well it predicts frames that it was not fitted to.
 """
 
 from __future__ import annotations
@@ -22,10 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.detectability_conditions import CONDITIONS
-from lab.detectability_fit import fit
+from lab.detectability_fit import auc, brier, deciles, fit
 from lab.detectability_frames import KINDS, MAPS, Detectors, Kind, ReadFrame, read_frames
-from lab.detectability_page import page
-from lab.detectability_report import WHOLE, Sample, draw
 from pytest_garl import cpu_dispatch
 from pytest_garl.flight.flight import MarkerView
 from pytest_garl.verdicts.detectability import COEFFICIENTS, Network, features
@@ -34,7 +32,8 @@ Array = NDArray[np.float64]
 FIELDS = tuple(field.name for field in dataclasses.fields(MarkerView))
 COLUMNS = ("scenario", "map", *CONDITIONS, "height_m", *FIELDS, "stock", "good", "learned")
 CHUNK = 20
-DIAGRAM = Path("pictures", "detectability.png")
+WHOLE = 0.9
+"""Share of the marker in the frame from which frames count in the calibration."""
 
 
 def table_of(frames: Iterable[ReadFrame]) -> Array:
@@ -74,46 +73,32 @@ def half_of(table: Array) -> NDArray[np.intp]:
     return half
 
 
-def fitted(tables: Sequence[Array], columns: slice = slice(None)) -> Network:
+def fitted(tables: Sequence[Array]) -> Network:
     """Return the network fitted to all rows of some tables."""
     rows = np.concatenate(tables)
-    return fit(features_of(rows)[:, columns], reads_of(rows).max(axis=1))
+    return fit(features_of(rows), reads_of(rows).max(axis=1))
 
 
-def held_out(tables: Sequence[Array]) -> list[Sample]:
-    """Return each table with the predictions of networks that have not seen the row's half."""
-    predicted = [np.zeros((4, len(table))) for table in tables]
+def held_out(tables: Sequence[Array]) -> list[Array]:
+    """Return the predictions of each table's rows, by oracles that have not seen the row's half."""
+    predicted = [np.zeros(len(table)) for table in tables]
     for half in (0, 1):
-        others = [table[half_of(table) != half] for table in tables]
-        oracle = fitted(others)
-        by_size, without_cover = fitted(others, slice(1)), fitted(others, slice(3))
-        constant = float(reads_of(np.concatenate(others)).max(axis=1).mean())
+        oracle = fitted([table[half_of(table) != half] for table in tables])
         for table, into in zip(tables, predicted, strict=True):
             chosen = half_of(table) == half
-            inputs = features_of(table[chosen])
-            into[0, chosen] = oracle.probabilities(inputs)
-            into[1, chosen] = by_size.probabilities(inputs[:, :1])
-            into[2, chosen] = without_cover.probabilities(inputs[:, :3])
-            into[3, chosen] = constant
-    return [sample_of(table, into) for table, into in zip(tables, predicted, strict=True)]
+            into[chosen] = oracle.probabilities(features_of(table[chosen]))
+    return predicted
 
 
-def sample_of(table: Array, predicted: Array) -> Sample:
-    """Return the rows with their predictions (4, n), in the order of ``Sample``'s fields."""
-    column = {name: table[:, index] for index, name in enumerate(COLUMNS)}
-    first = COLUMNS.index(CONDITIONS[0])
-    return Sample(
-        predicted=predicted[0],
-        by_size=predicted[1],
-        without_cover=predicted[2],
-        constant=predicted[3],
-        read_by=reads_of(table),
-        map=column["map"],
-        conditions=table[:, first : first + len(CONDITIONS)],
-        height_m=column["height_m"],
-        share_in_frame=column["share_in_frame"],
-        hidden=(column["border_hidden"] + column["bits_hidden"]) / 2,
-        px_per_module=column["px_per_module"],
+def score_line(kind: str, table: Array, predicted: Array) -> str:
+    """Return AUC, Brier score and the largest error of ten groups of equal size."""
+    whole = table[:, COLUMNS.index("share_in_frame")] >= WHOLE
+    read, predicted = reads_of(table[whole]).max(axis=1), predicted[whole]
+    worst = max(abs(each.error) for each in deciles(predicted, read))
+    return (
+        f"{kind}: {len(read)} frames with the whole marker, {read.mean():.3f} of them read, "
+        f"{predicted.mean():.3f} predicted, AUC {auc(predicted, read):.3f}, "
+        f"Brier score {brier(predicted, read):.3f}, largest error of a tenth {worst:.3f}"
     )
 
 
@@ -148,7 +133,7 @@ def generate(scenarios: int, kind: Kind, workers: int) -> Array:
 
 
 def main() -> None:
-    """Draw the frames where there are none, fit, and write coefficients, page and diagram."""
+    """Draw the frames where there are none, fit, write the coefficients, and print the scores."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenarios", type=int, default=2000, help="default 2000")
     parser.add_argument(
@@ -157,7 +142,6 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--frames", type=Path, default=Path(".garl/detectability.npz"))
     parser.add_argument("--coefficients", type=Path, default=COEFFICIENTS)
-    parser.add_argument("--docs", type=Path, default=Path("docs"))
     arguments = parser.parse_args()
     if not arguments.frames.exists():
         counts = (arguments.scenarios, *[arguments.others] * (len(KINDS) - 1))
@@ -169,13 +153,11 @@ def main() -> None:
         tables = [file[kind] for kind in KINDS]
     with pinned_processes(1) as process:
         oracle = process.submit(fitted, tables).result()
-        usual, *others = process.submit(held_out, tables).result()
+        predicted = process.submit(held_out, tables).result()
     values = json.dumps(dataclasses.asdict(oracle), indent=1)
     arguments.coefficients.write_text(values + "\n", encoding="utf-8")
-    draw(usual.where(usual.share_in_frame >= WHOLE), arguments.docs / DIAGRAM)
-    text = page(usual, others)
-    (arguments.docs / "detectability.md").write_text(text, encoding="utf-8")
-    print(text)
+    for each in zip(KINDS, tables, predicted, strict=True):
+        print(score_line(*each))
 
 
 if __name__ == "__main__":

@@ -14,13 +14,18 @@ import dataclasses
 import itertools
 import os
 from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lab.oracle import oracle_spec
 from lab.table import Key, ResultTable, Row, run_study, share
+from pytest_garl.npcs.interference import Interfering, Mind
+from pytest_garl.npcs.learned import LearnedMind, shipped
+from pytest_garl.npcs.minds import Direct, Intercepting, ToMarker
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.domain_file import domain_named
@@ -36,10 +41,17 @@ from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Verdict
 SEED = 2810
 """No training and no other study uses it."""
 CHUNK = 10
-MINDS = ("learned", "direct", "intercepting", "to-marker")
+UNLEARNED: dict[str, Callable[[], Mind]] = {
+    "direct": Direct,
+    "intercepting": Intercepting,
+    "to-marker": ToMarker,
+}
+MINDS = ("learned", *UNLEARNED)
 """Minds of the grades that see the UAV in part; the first one is what ``garl train`` wrote."""
 GRADED = tuple(f"{grade} {mind}" for grade in ("curious", "chasing") for mind in MINDS)
 MOVERS = ("absent", "careless", *GRADED, "hostile", "waypoint", "dqn-paper")
+RIVALS = ("oracle",)
+"""Movers that fly only if ``--movers`` names them; ``docs/grades.csv`` has no rows of them."""
 SYSTEMS = ("opencv", "mm")
 MAPS = ("court", "lawn")
 COUNTS = ("one", "all")
@@ -70,14 +82,23 @@ def spec_of(mover: str) -> PolicySpec:
     """Return the specification of a mover."""
     if mover == "absent":
         return policy_spec("stationary")
+    if mover == "oracle":
+        return oracle_spec()
     grade, _, mind = mover.partition(" ")
     if not mind:
         return policy_spec(grade)
     return PolicySpec(
         name=mover,
-        factory="lab.minds:interfering",
+        factory=f"{__name__}:{interfering.__name__}",
         arguments=(("grade", grade), ("mind", mind)),
     )
+
+
+def interfering(grade: str, mind: str) -> Interfering:
+    """Return the NPC policy of a grade with a learned or an unlearned mind."""
+    if mind == "learned":
+        return Interfering(grade, LearnedMind(shipped(grade)))
+    return Interfering(grade, UNLEARNED[mind]())
 
 
 def scenario_of(map_name: str, npcs: str, number: int, grade: str) -> Scenario:
@@ -167,7 +188,7 @@ def report(rows: list[Row]) -> str:
         "| system | NPCs | mover | flights | collided | who (p / c / d / b) | gave up | landed |",
         "| --- | --- | --- | ---: | --- | --- | --- | --- |",
     ]
-    for system, npcs, mover in itertools.product(SYSTEMS, COUNTS, MOVERS):
+    for system, npcs, mover in itertools.product(SYSTEMS, COUNTS, (*MOVERS, *RIVALS)):
         own = [
             row
             for row in rows
@@ -195,7 +216,7 @@ def main() -> None:
     """Fly the missing flights, or print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flights", type=int, default=100, help="per cell and map; default 100")
-    parser.add_argument("--movers", nargs="+", default=list(MOVERS))
+    parser.add_argument("--movers", nargs="+", choices=(*MOVERS, *RIVALS), default=list(MOVERS))
     parser.add_argument("--systems", nargs="+", default=list(SYSTEMS))
     parser.add_argument("--npcs", nargs="+", default=list(COUNTS))
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
