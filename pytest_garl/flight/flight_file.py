@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import io
 import json
@@ -95,18 +96,18 @@ def save(flight: Flight, path: Path) -> None:
         "elapsed_s": flight.elapsed_s,
         "marker_position_m": flight.marker_position_m,
         "objects": [[item.name, item.type] for item in flight.objects],
-        "contacts": [dataclasses.asdict(item) for item in flight.contacts],
-        "separations": [dataclasses.asdict(item) for item in flight.separations],
-        "events": [dataclasses.asdict(item) for item in flight.events],
-        "steps": [dataclasses.asdict(item) for item in flight.steps],
+        "contacts": flight.contacts,
+        "separations": flight.separations,
+        "events": flight.events,
+        "steps": flight.steps,
         "decoys": flight.decoys,
-        "crash": dataclasses.asdict(flight.crash) if flight.crash else None,
-        "touchdown": dataclasses.asdict(flight.touchdown) if flight.touchdown else None,
-        "earlier_touchdowns": [dataclasses.asdict(item) for item in flight.earlier_touchdowns],
-        "nominal_views": [dataclasses.asdict(item) for item in flight.nominal_views],
+        "crash": flight.crash,
+        "touchdown": flight.touchdown,
+        "earlier_touchdowns": flight.earlier_touchdowns,
+        "nominal_views": flight.nominal_views,
         "nominal_arrival_s": flight.nominal_arrival_s,
         "nominal_landing_s": flight.nominal_landing_s,
-        "rangefinder": dataclasses.asdict(flight.rangefinder) if flight.rangefinder else None,
+        "rangefinder": flight.rangefinder,
         "data_read": flight.data_read,
         "conditions": flight.conditions,
         "sha256": flight.sha256,
@@ -117,7 +118,7 @@ def save(flight: Flight, path: Path) -> None:
     if any(item.changes for item in flight.objects):
         header["changes"] = [item.changes for item in flight.objects]
     try:
-        text = json.dumps(header, allow_nan=False)
+        text = json.dumps(header, default=_fields, allow_nan=False)
     except ValueError:
         held = ", ".join(name for name, value in header.items() if _holds_nan(value))
         raise NotFiniteError(f"the flight's record holds a NaN or an infinity in {held}") from None
@@ -130,9 +131,19 @@ def save(flight: Flight, path: Path) -> None:
     incomplete.replace(path)
 
 
+def _fields(value: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass; ``dataclasses.asdict`` would copy each of their values."""
+    return {name: getattr(value, name) for name in _names(type(value))}  # type: ignore[arg-type]
+
+
+@functools.cache
+def _names(kind: type) -> tuple[str, ...]:
+    return tuple(field.name for field in dataclasses.fields(kind))
+
+
 def _holds_nan(value: Any) -> bool:
     try:
-        json.dumps(value, allow_nan=False)
+        json.dumps(value, default=_fields, allow_nan=False)
     except ValueError:
         return True
     return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import time
 from collections.abc import Callable
 from importlib.metadata import version
@@ -44,7 +45,12 @@ def fly(
         with_nominal_landing(loop.run(), placed, loop.camera),
         conditions=tuple(each.cause for each in active_conditions(scenario)),
         cpu=dispatched(),
-        versions=tuple((name, version(name)) for name in PACKAGES),
+        versions=_versions(),
         wall_s=time.perf_counter() - began,
     )
     return dataclasses.replace(flight, sha256=hash_of(flight))
+
+
+@functools.cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    return tuple((name, version(name)) for name in PACKAGES)

@@ -65,6 +65,7 @@ class Loop:
         scenario, map = placed.scenario, placed.map
         self.scenario, self.map, self._placed = scenario, map, placed
         self._time_limit_s = time_limit_s
+        self._ticks_allowed = round(time_limit_s * PHYSICS_RATE_HZ)
         self._system = SystemUnderTest(system, guard)
         self.camera = self._system.airframe.camera
         self._model = vehicle_model(self._system.airframe)
@@ -139,9 +140,9 @@ class Loop:
 
         A UAV that has touched down in time may come to rest.
         """
-        now, limit_s = self._ticks / PHYSICS_RATE_HZ, self._time_limit_s
-        in_time = self._ticks < round(limit_s * PHYSICS_RATE_HZ)
-        return not (in_time or self._contacts.settling(now, limit_s))
+        if self._ticks < self._ticks_allowed:
+            return False
+        return not self._contacts.settling(self._ticks / PHYSICS_RATE_HZ, self._time_limit_s)
 
     def tick(self) -> Outcome | None:
         """Advance by 1/240 s; return the outcome once there is one."""
@@ -157,7 +158,7 @@ class Loop:
             raise self._system.not_finite_error(now)
         if tick % TICKS_PER_NPC_STEP == 0:
             self.phases.update(now, up_m(position[2]))
-            self._move_npcs(tick)
+            self._move_npcs(tick, position)
         if tick % TICKS_PER_TRACK_SAMPLE == 0:
             self._contacts.record_pose(now)
             if isinstance(self._command, Abort) and self._contacts.gave_up(position):
@@ -197,11 +198,10 @@ class Loop:
             self._wanted_thrusts = self._system.control(state, self._model.max_thrust_n)
         return self._wanted_thrusts
 
-    def _move_npcs(self, tick: int) -> None:
+    def _move_npcs(self, tick: int, uav_m: Vector) -> None:
         if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
             moves = [npc.decide(self.situation(npc)) for npc in self.npcs]
             self._change([change for move in moves for change in move.changes])
-        uav_m, *_ = self._world.uav_state()
         for npc in self.npcs:
             npc.take_in(self.recorder.time_s, self.phases.began_s, uav_m)
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ, self.npcs)

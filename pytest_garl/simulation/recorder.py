@@ -120,10 +120,10 @@ class Recorder:
         """Record an event."""
         self._events.append(Event(time_s=self.time_s, name=name, text=text))
 
-    def sight(self, frame: Frame, renderer: Renderer, eye: Vector, attitude: Quaternion) -> Sight:
+    def sight(self, frame: Frame, renderer: Renderer, eye: Vector) -> Sight:
         """Return what a frame shows of the marker and of the objects."""
         ids = renderer.segment_ids
-        area = renderer.marker_area_px(eye, attitude)
+        area = frame.marker_area_px
         names = [item.name for item in self._objects if frame.pixels[ids[item.name]]]
         return Sight(
             marker_visible=min(1.0, float(frame.pixels[ids["marker"]]) / area)

@@ -109,7 +109,7 @@ class Sensors:
         )
         frame = self._renderer.render(eye, attitude, now, poses, movement)
         frame.measured_m = self._depth.measured(frame.depth_m, now)
-        sight = self._recorder.sight(frame, self._renderer, eye, attitude)
+        sight = self._recorder.sight(frame, self._renderer, eye)
         if self._freezes:
             self._last_look = frame, sight
         return frame, sight

@@ -44,10 +44,7 @@ class _Covering(Renderer):
         scenario = placed.scenario
         self._event = Event(scenario, "cover")
         share = scenario["cover.share_percent"] / 100
-        pad = dataclasses.replace(placed.pad, covered_share=share)
-        # The same draws: nothing but the cover differs.
-        again = generator(scenario.seed, "sensor")
-        self._with_cover = Renderer(placed, camera, again, colour=colour, pad=pad)
+        self._with_cover = self.with_pad(dataclasses.replace(placed.pad, covered_share=share))
 
     def change(self, scenario: Scenario) -> None:
         """Show the environment of ``scenario`` from the next frame on."""

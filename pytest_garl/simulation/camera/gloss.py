@@ -28,9 +28,11 @@ class Gloss:
 def gloss_of(view: View, conditions: Conditions, focal_px: float) -> Gloss | None:
     """Return the sun's reflection on wet ground, where the mirrored ray meets the sun."""
     strength = 230.0 * conditions.wetness * conditions.direct_share
+    if strength < 1:
+        return None
     x, y, z = conditions.sun
     mirrored = view.axes @ np.array([x, y, -z])
-    if strength < 1 or mirrored[2] < 0.3:
+    if mirrored[2] < 0.3:
         return None
     u, v = (float(value) for value in view.pixels(mirrored[None])[0])
     sigma = SPECULAR_RADIUS * focal_px / float(mirrored[2])

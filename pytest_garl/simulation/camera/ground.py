@@ -54,10 +54,15 @@ class Raster:
     def holds(self, points: NDArray[np.float64]) -> bool:
         """Whether homogeneous world points (3, n) of equal sign all lie well inside."""
         places = points[:2] / points[2]
+        low, high = self._inner
+        return bool(((places >= low) & (places <= high)).all())
+
+    @functools.cached_property
+    def _inner(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The lowest and the highest places (2, 1) that lie well inside."""
         slack = 4 * self.m_per_px * 2 ** len(self.levels)
         low, high = self.outline.min(axis=0) + slack, self.outline.max(axis=0) - slack
-        inside = (places >= low[:, None]) & (places <= high[:, None])
-        return bool(inside.all())
+        return low[:, None], high[:, None]
 
     def pixel_of_world(self, level: int) -> NDArray[np.float64]:
         """Matrix (3, 3) from homogeneous world (x, y) to pixel centres of a level."""

@@ -58,6 +58,7 @@ class MarkerSight:
         ring //= PROBES_PER_MODULE
         self._margin, self._border, self._bits = ring == 0, ring == 1, ring >= 2
         self._on_marker = ~self._margin
+        self._places_on_marker = int(np.count_nonzero(self._on_marker))
         self._middle_m = np.array(patch.marker.place_m)
         # The four corners of the marker, then the places: projected together.
         self._points_m = np.concatenate([np.array(patch.marker.outline_m), patch.places_m])
@@ -88,7 +89,7 @@ class MarkerSight:
             corners, (column, row) = shown[:4], np.rint(shown[4:]).astype(np.intp).T
             height, width = self._lens.stretch.shape
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        framed = np.count_nonzero(inside & self._on_marker) / np.count_nonzero(self._on_marker)
+        framed = np.count_nonzero(inside & self._on_marker) / self._places_on_marker
         if not framed:
             return None
         light = self._light(shadows)
@@ -104,10 +105,11 @@ class MarkerSight:
         if (clear := exposure.clear(row[inside], column[inside])) is not None:
             # To a detector a dirty lens is what uneven light is.
             contrast, lit = contrast * float(clear.mean()), lit * clear
+        module_px = self._px_per_module(corners)
         return MarkerView(
             share_in_frame=round(float(framed), _ROUND),
-            edge_modules=round(self._edge_modules(corners, width, height), _ROUND),
-            px_per_module=round(self._px_per_module(corners), _ROUND),
+            edge_modules=round(_edge_modules(corners, width, height, module_px), _ROUND),
+            px_per_module=round(module_px, _ROUND),
             border_hidden=_mean(errors, inside & self._border),
             bits_hidden=_mean(errors, inside & self._bits),
             margin_hidden=_mean(errors, inside & self._margin),
@@ -128,7 +130,7 @@ class MarkerSight:
     def _light(self, shadows: Sequence[Shadow]) -> Array:
         """Return the share of full light at each place, with the shadows of the objects."""
         light, conditions = self._patch.light, self._conditions
-        if not sun_shines(conditions):
+        if not shadows or not sun_shines(conditions):
             return light
         patch, probes = self._patch, self._patch.probes
         half = patch.module_m * patch.modules / 2
@@ -176,13 +178,6 @@ class MarkerSight:
         difference = float(grey[white].mean() - grey[black].mean())
         return round(max(0.0, difference * self._sensor.exposure), _ROUND)
 
-    def _edge_modules(self, corners: Array, width: int, height: int) -> float:
-        """Return the distance of the nearest corner from the picture's edge, at most a module."""
-        low = float(corners.min()) + 0.5
-        right = width - 0.5 - float(corners[:, 0].max())
-        bottom = height - 0.5 - float(corners[:, 1].max())
-        return min(1.0, min(low, right, bottom) / max(self._px_per_module(corners), 1e-3))
-
     def _px_per_module(self, corners: Array) -> float:
         """Return the smaller singular value of the map from the ground to pixels, for a module."""
         patch = self._patch
@@ -223,6 +218,14 @@ class BoardSight:
         return max(whole, key=lambda each: each.px_per_module) if whole else main
 
 
+def _edge_modules(corners: Array, width: int, height: int, module_px: float) -> float:
+    """Return the distance of the nearest corner from the picture's edge, at most a module."""
+    low = float(corners.min()) + 0.5
+    right = width - 0.5 - float(corners[:, 0].max())
+    bottom = height - 0.5 - float(corners[:, 1].max())
+    return min(1.0, min(low, right, bottom) / max(module_px, 1e-3))
+
+
 def _is_whole(view: MarkerView) -> bool:
     return view.edge_modules >= 0 and max(view.border_hidden, view.bits_hidden) < _MOSTLY
 
@@ -247,4 +250,5 @@ def _behind(
 
 
 def _mean(errors: Array, chosen: NDArray[np.bool_]) -> float:
-    return round(float(errors[chosen].mean()), _ROUND) if chosen.any() else 1.0
+    found = errors[chosen]
+    return round(float(np.add.reduce(found) / len(found)), _ROUND) if len(found) else 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -43,15 +44,21 @@ class View:
     def of(cls, camera: Camera, position_m: Vector, q: Quaternion) -> View:
         """Return the view of a camera under a UAV with attitude ``q``."""
         body = rotation_matrix(q)
-        axes = np.stack([-body[:, 1], -body[:, 0], -body[:, 2]])
+        axes = np.empty((3, 3))
+        for row, column in zip(axes, (1, 0, 2), strict=True):
+            np.negative(body[:, column], out=row)
         return cls(camera=camera, eye=np.array(position_m), axes=axes)
 
     @cached_property
     def ground_of_pixel(self) -> NDArray[np.float64]:
         """Matrix (3, 3) from homogeneous pixels to homogeneous world (x, y) on the ground."""
-        rays = self.axes.T @ np.linalg.inv(self.camera.matrix)
+        rays = self.axes.T @ _ray_of_pixel(self.camera)
         x, y, z = self.eye
-        return np.stack([x * rays[2] - z * rays[0], y * rays[2] - z * rays[1], rays[2]])
+        ground = np.empty((3, 3))
+        ground[0] = x * rays[2] - z * rays[0]
+        ground[1] = y * rays[2] - z * rays[1]
+        ground[2] = rays[2]
+        return ground
 
     def pixels(self, seen: NDArray[Any]) -> Array:
         """Project camera-frame points (n, 3), all in front, to pixels (n, 2)."""
@@ -114,6 +121,14 @@ class View:
         """Half the frame's width and height as tangents."""
         camera = self.camera
         return camera.width_px / 2 / camera.focal_px, camera.height_px / 2 / camera.focal_px
+
+
+@functools.lru_cache(maxsize=8)
+def _ray_of_pixel(camera: Camera) -> NDArray[np.float64]:
+    """Return the matrix (3, 3) from homogeneous pixels to rays in the camera's frame."""
+    inverse = np.asarray(np.linalg.inv(camera.matrix), np.float64)
+    inverse.setflags(write=False)
+    return inverse
 
 
 def ground_depth(view: View, columns: Array, rows: Array) -> tuple[Array, bool]:

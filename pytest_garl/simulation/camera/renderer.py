@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import functools
 import math
 from collections.abc import Mapping, Sequence
@@ -78,7 +79,6 @@ class Renderer:
 
     ``segment_ids`` numbers ground (0), marker (1), static bodies and dynamic objects.
     With ``colour=False`` no ground is painted: such a renderer gives frames without images.
-    ``pad`` is that of the scenario, unless another one is given.
     """
 
     def __init__(
@@ -88,16 +88,16 @@ class Renderer:
         rng: np.random.Generator,
         *,
         colour: bool = True,
-        pad: Pad | None = None,
     ) -> None:
         scenario, map = placed.scenario, placed.map
         self.camera, self._lens = camera, lens_of(camera)
         # What is drawn is what a pinhole sees; a lens bends it.
         self._drawn = drawn = self._lens.pinhole if self._lens else camera
         conditions = conditions_of(scenario)
-        self.pad, self._map = placed.pad if pad is None else pad, map
+        self.pad, self._map = placed.pad, map
         self._optics = Optics(scenario, camera)
         self.marker_m = self.pad.place_m
+        self._outline_m = np.array(self.pad.main.outline_m)
         names = ["ground", "marker", *(body.name for body in map.bodies)]
         names += [name for name, _ in map.present_objects]
         self.segment_ids: Mapping[str, int] = {name: index for index, name in enumerate(names)}
@@ -113,6 +113,18 @@ class Renderer:
         self._stretch = np.sqrt(1 + across**2 + down**2)
         self._before_draws = copy.deepcopy(rng)
         self._prepare(conditions, rng)
+
+    def with_pad(self, pad: Pad) -> Renderer:
+        """Return what draws another pad in its place, with the same draws of chance."""
+        other = Renderer.__new__(Renderer)
+        vars(other).update(vars(self))
+        other.pad, other._outline_m = pad, np.array(pad.main.outline_m)
+        if self._ground is not None:
+            other._ground = paint_ground(self._map, self.conditions, self._shift, pad)
+        look = self._look
+        sight = other._sight_of(look.conditions, look.sensor, look.particles)
+        other._look = dataclasses.replace(look, sight=sight)
+        return other
 
     @property
     def conditions(self) -> Conditions:
@@ -142,22 +154,26 @@ class Renderer:
         veil = (1 - np.arange(256) / 255)[:, None] * airlight
         sensor = Sensor(self.camera, conditions, rng)
         particles = Particles(self._drawn, conditions, rng)
-        pad = self.pad
-        patches = [
-            paint_patch(each, pad, self._map, conditions, self._shift) for each in pad.markers
-        ]
-        sights = [
-            MarkerSight(self._drawn, self._lens, patch, conditions, sensor, particles)
-            for patch in patches
-        ]
         self._look = _Look(
             conditions=conditions,
             sensor=sensor,
             particles=particles,
-            sight=BoardSight(sights),
+            sight=self._sight_of(conditions, sensor, particles),
             decay=(-conditions.extinction_per_m * self._stretch).astype(np.float32),
             air=airlight.astype(np.uint8),
             veil=np.round(veil).astype(np.uint8).reshape(1, 256, 3),
+        )
+
+    def _sight_of(self, conditions: Conditions, sensor: Sensor, particles: Particles) -> BoardSight:
+        pad = self.pad
+        patches = [
+            paint_patch(each, pad, self._map, conditions, self._shift) for each in pad.markers
+        ]
+        return BoardSight(
+            [
+                MarkerSight(self._drawn, self._lens, patch, conditions, sensor, particles)
+                for patch in patches
+            ]
         )
 
     def render(
@@ -177,7 +193,8 @@ class Renderer:
         segmentation = np.zeros(depth.shape, np.int32)
         if horizon:
             segmentation[depth >= FAR_M] = -1
-        marker = _draw_marker(segmentation, view, self.pad)
+        outline = self._outline(view)
+        marker = _draw_marker(segmentation, view, self.pad, outline)
         sky = segmentation < 0 if horizon else None
         footprint = float(depth[depth.shape[0] // 2, depth.shape[1] // 2]) / self.camera.focal_px
         self._solids.place(objects)
@@ -203,6 +220,7 @@ class Renderer:
         return Frame(
             paint=functools.partial(self._paint, scene),
             marker=functools.partial(self._marker_view, scene),
+            marker_area_px=functools.partial(self._marker_area_px, view, outline),
             depth_m=depth,
             segmentation=segmentation,
             pixels=pixels,
@@ -233,9 +251,12 @@ class Renderer:
 
     def marker_pixels(self, position_m: Vector, attitude: Quaternion) -> int:
         """Count the marker's pixels in a frame with nothing in front of it."""
-        shape = self._drawn.height_px, self._drawn.width_px
-        segmentation = np.zeros(shape, np.int32)
-        _draw_marker(segmentation, View.of(self._drawn, position_m, attitude), self.pad)
+        view = View.of(self._drawn, position_m, attitude)
+        return self._marker_pixels(view, self._outline(view))
+
+    def _marker_pixels(self, view: View, outline: Array) -> int:
+        segmentation = np.zeros((self._drawn.height_px, self._drawn.width_px), np.int32)
+        _draw_marker(segmentation, view, self.pad, outline)
         if self._lens:
             segmentation = self._lens.nearest(segmentation)
         return int(np.count_nonzero(segmentation))
@@ -244,19 +265,17 @@ class Renderer:
         """Whether places (n, 2) on the ground lie under leaves or snow, shape (n,)."""
         return covered(places_m, self._shift, self.conditions)
 
-    def marker_area_px(self, position_m: Vector, attitude: Quaternion) -> float:
-        """Projected area of the marker, clipped to the frame, with nothing in front."""
+    def _marker_area_px(self, view: View, outline: Array) -> float:
         if self._lens:
-            return float(self.marker_pixels(position_m, attitude))
-        polygon = self.marker_outline(position_m, attitude)
-        if len(polygon) < 3:
+            return float(self._marker_pixels(view, outline))
+        if len(outline) < 3:
             return 0.0
         width, height = self.camera.width_px, self.camera.height_px
         frame = np.array(
             [[-0.5, -0.5], [width - 0.5, -0.5], [width - 0.5, height - 0.5], [-0.5, height - 0.5]],
             np.float32,
         )
-        area, _ = cv2.intersectConvexConvex(polygon, frame)
+        area, _ = cv2.intersectConvexConvex(outline, frame)
         return float(area)
 
     def marker_side_px(self, height_m: float) -> float:
@@ -265,9 +284,12 @@ class Renderer:
 
     def marker_outline(self, position_m: Vector, attitude: Quaternion) -> Array:
         """Return the pixels (n, 2) about which the marker lies, also outside of the picture."""
-        view = View.of(self._drawn, position_m, attitude)
-        corners = view.ground_polygon(np.array(self.pad.main.outline_m))
+        corners = self._outline(View.of(self._drawn, position_m, attitude))
         return self._lens.shown(_rounded(corners)) if self._lens else corners
+
+    def _outline(self, view: View) -> Array:
+        """Return the corners (n, 2) of the marker in a view as a pinhole shows them."""
+        return view.ground_polygon(self._outline_m)
 
 
 def _rounded(corners: Array) -> Array:
@@ -277,19 +299,20 @@ def _rounded(corners: Array) -> Array:
     return np.concatenate(sides).astype(np.float32) if sides else corners
 
 
-def _draw_marker(segmentation: NDArray[np.int32], view: View, pad: Pad) -> tuple[slice, slice]:
+def _draw_marker(
+    segmentation: NDArray[np.int32], view: View, pad: Pad, outline: Array
+) -> tuple[slice, slice]:
     """Draw the marker's segment; return the rows and columns that hold it."""
-    polygon = view.ground_polygon(np.array(pad.main.outline_m))
-    if len(polygon) < 3:
+    if len(outline) < 3:
         return slice(0, 0), slice(0, 0)
-    points = np.round(polygon * 2**_SHIFT).astype(np.int32)
+    points = np.round(outline * 2**_SHIFT).astype(np.int32)
     cv2.fillConvexPoly(segmentation, points, (1.0,), cv2.LINE_8, _SHIFT)
     if pad.covered_share > 0:
         cover = view.ground_polygon(np.array(pad.cover_m))
         if len(cover) >= 3:
             fixed = np.round(cover * 2**_SHIFT).astype(np.int32)
             cv2.fillConvexPoly(segmentation, fixed, (0.0,), cv2.LINE_8, _SHIFT)
-    return view.box(polygon)
+    return view.box(outline)
 
 
 def _ground_image(scene: _Scene) -> NDArray[np.uint8]:
@@ -337,11 +360,30 @@ def _warp(
 ) -> None:
     wanted = math.log2(max(footprint_m / raster.m_per_px, 1e-6))
     level = min(len(raster.levels) - 1, max(0, round(wanted)))
+    source, pixel_of_pixel = raster.levels[level], raster.pixel_of_world(level) @ world
+    if border == cv2.BORDER_REFLECT_101 and _stays_within(source, image, pixel_of_pixel):
+        # The same bytes in two thirds of the time: nothing is reflected.
+        border = cv2.BORDER_CONSTANT
     cv2.warpPerspective(
-        raster.levels[level],
-        raster.pixel_of_world(level) @ world,
+        source,
+        pixel_of_pixel,
         (image.shape[1], image.shape[0]),
         image,
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=border,
     )
+
+
+def _stays_within(
+    source: NDArray[np.uint8], image: NDArray[np.uint8], pixel_of_pixel: NDArray[np.float64]
+) -> bool:
+    """Whether a map from the pixels of an image leads to pixels well inside another one only."""
+    (height, width), (rows, columns) = image.shape[:2], source.shape[:2]
+    right, bottom = width - 1.0, height - 1.0
+    corners = np.array([[0, right, right, 0], [0, 0, bottom, bottom], [1, 1, 1, 1]])
+    u, v, w = (pixel_of_pixel @ corners).tolist()
+    # Between corners of one sign a straight line stays straight.
+    if not (min(w) > 0 or max(w) < 0):
+        return False
+    places = [(x / z, y / z) for x, y, z in zip(u, v, w, strict=True)]
+    return all(1 <= x <= columns - 2 and 1 <= y <= rows - 2 for x, y in places)

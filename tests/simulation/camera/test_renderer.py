@@ -1,10 +1,15 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import math
 
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.chromosome import decode
@@ -17,6 +22,11 @@ from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Renderer
 from tests.support.pictures import CAMERA, LEVEL, poses, renderer
+
+
+@functools.cache
+def unmoved_renderer() -> Renderer:
+    return renderer()[0]
 
 
 def picture(seed: int = 0, height: float = 6.0, **genes: float) -> Frame:
@@ -73,7 +83,7 @@ def test_the_markers_area_agrees_with_its_pixels() -> None:
         eye = (x + 0.3, y - 0.2, height)
         frame = made.render(eye, LEVEL, 0.0, poses(x + 6, y))
         counted = (frame.segmentation == 1).sum()
-        side = made.marker_area_px(eye, LEVEL) ** 0.5
+        side = frame.marker_area_px**0.5
         # fillConvexPoly draws the outline as well: half a pixel on each side.
         assert counted**0.5 == pytest.approx(side, abs=1.2)
 
@@ -96,3 +106,26 @@ def test_another_marker_is_drawn_where_asked() -> None:
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50))
     _, ids, _ = detector.detectMarkers(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
     assert np.ravel(ids).tolist() == [7]
+
+
+@given(
+    st.floats(-12, 12), st.floats(-9, 9), st.floats(0.3, 13), st.floats(-3, 3), st.floats(-0.3, 0.3)
+)
+def test_the_border_that_is_not_reached_does_not_change_the_ground(
+    x: float, y: float, height: float, yaw: float, roll: float
+) -> None:
+    made = unmoved_renderer()
+    attitude = (
+        math.sin(roll / 2) * math.cos(yaw / 2),
+        math.sin(roll / 2) * math.sin(yaw / 2),
+        math.cos(roll / 2) * math.sin(yaw / 2),
+        math.cos(roll / 2) * math.cos(yaw / 2),
+    )
+
+    def image() -> NDArray[np.uint8]:
+        return made.render((x, y, height), attitude, 0.0, poses(40.0, 40.0)).image
+
+    fast = image()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pytest_garl.simulation.camera.renderer._stays_within", lambda *_: False)
+        assert (fast == image()).all()
