@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 from collections.abc import Iterator
 
@@ -16,6 +17,7 @@ def faster_runs() -> Iterator[None]:
     """Let runs of pytest in other processes start without other plugins, and warm."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTEST_ADDOPTS", FASTER)
+        patch.setattr(WarmPopen, "environment", dict(os.environ))
         patch.setattr(subprocess, "Popen", WarmPopen)
         yield
 

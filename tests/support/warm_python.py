@@ -57,6 +57,8 @@ class WarmPopen(subprocess.Popen[Any]):
     """``subprocess.Popen``, which has the server fork Python if that is to run pytest or garl."""
 
     server: ClassVar[Server | None] = None
+    environment: ClassVar[Mapping[str, str]] = dict(os.environ)
+    """The server's, which starts in a test that may have changed its own."""
     _is_warm = False
 
     def _execute_child(self, *given: Any) -> None:
@@ -101,7 +103,7 @@ class WarmPopen(subprocess.Popen[Any]):
     @classmethod
     def _server(cls) -> Server:
         if cls.server is None:
-            cls.server = Server.of_this_process()
+            cls.server = Server.of_this_process(cls.environment)
         return cls.server
 
 
@@ -124,8 +126,8 @@ class Server:
         self._statuses: dict[int, int] = {}
 
     @classmethod
-    def of_this_process(cls) -> Self:
-        """Start a server that ends with this process."""
+    def of_this_process(cls, environment: Mapping[str, str]) -> Self:
+        """Start a server that has this environment and ends with this process."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             process = subprocess.Popen(
@@ -133,12 +135,12 @@ class Server:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
-                env={**os.environ, "PYTHONPATH": ""},
+                env={**environment, "PYTHONPATH": ""},
             )
-        # Reading its end waits for it, so that a test run's times include those of its runs.
+        # Waited for, so that the CPU time of these tests includes that of the runs they start.
         atexit.register(process.wait)
         atexit.register(ours.close)
-        return cls(ours, os.environ)
+        return cls(ours, environment)
 
     def is_found_in(self, environment: Mapping[str, str]) -> bool:
         """Whether an interpreter would read from this environment what the server has read."""
