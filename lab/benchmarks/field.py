@@ -8,16 +8,15 @@ it flies OpenCV-MLS in ``field`` and in ``paper`` by turns and prints the ratio 
 from __future__ import annotations
 
 import argparse
+import functools
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
-from typing import Any
-from unittest import mock
+from collections.abc import Iterator
 
 import cv2
 import numpy as np
 
+from lab.benchmarks.speed import Parts, Shares
 from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl.landing_system import Camera
 from pytest_garl.npcs.policy_catalogue import policy_spec
@@ -40,17 +39,17 @@ from pytest_garl.simulation.fly import fly
 MAPS = ("court", "lawn")
 HEIGHTS_M = (10.0, 10.0, 10.0, 8.0, 6.0, 4.0, 2.0, 1.0)
 """A search at 10 m takes about as long as the descent."""
-PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
-    "depth and segments of solids": ((Solids, "draw"),),
-    "ground": ((renderer_module, "_ground_image"),),
-    "shadows": ((renderer_module, "draw_shadows"),),
-    "colours of solids": ((PaintedSolid, "paint_onto"),),
-    "rain, snow, leaves": ((Particles, "draw"),),
-    "fog and dust": ((renderer_module, "_fog"),),
-    "blur and dirt": ((Exposure, "moved"), (Exposure, "soiled")),
-    "sensor": ((Sensor, "expose"),),
-    "what shows of the marker": ((renderer_module.Renderer, "_marker_view"),),
-}
+PARTS: Parts = (
+    ("depth and segments of solids", Solids, ("draw",)),
+    ("ground", renderer_module, ("_ground_image",)),
+    ("shadows", renderer_module, ("draw_shadows",)),
+    ("colours of solids", PaintedSolid, ("paint_onto",)),
+    ("rain, snow, leaves", Particles, ("draw",)),
+    ("fog and dust", renderer_module, ("_fog",)),
+    ("blur and dirt", Exposure, ("moved", "soiled")),
+    ("sensor", Sensor, ("expose",)),
+    ("what shows of the marker", renderer_module.Renderer, ("_marker_view",)),
+)
 
 
 def scenarios(domain: str, map_name: str, count: int) -> Iterator[Scenario]:
@@ -66,7 +65,8 @@ def scenarios(domain: str, map_name: str, count: int) -> Iterator[Scenario]:
 def frame_ms(scenario: Scenario) -> list[float]:
     """Return the processor time in milliseconds of each frame of a landing's views."""
     map, rng = load_map(scenario.map), np.random.default_rng(scenario.seed)
-    made = renderer_of(Placed(scenario, map), Camera())
+    placed = Placed(scenario, map)
+    made = renderer_of(placed, Camera())
     x, y = made.marker_m
     times = []
     for number, height in enumerate(HEIGHTS_M):
@@ -78,7 +78,7 @@ def frame_ms(scenario: Scenario) -> list[float]:
         eye = eye_under((x + float(away[0]), y + float(away[1]), height), attitude)
         bodies = [
             ((x + float(dx), y + float(dy), 0.0), float(yaw))
-            for dx, dy, yaw in rng.uniform(-5, 5, (len(map.present_objects), 3))
+            for dx, dy, yaw in rng.uniform(-5, 5, (len(placed.map.present_objects), 3))
         ]
         movement = Movement(velocity_mps=(1.0, 0.5, -0.5), spin_radps=(0.05, 0.05, 0.0))
         began = time.process_time()
@@ -86,32 +86,6 @@ def frame_ms(scenario: Scenario) -> list[float]:
         frame.image, frame.marker  # noqa: B018 (both are made on access)
         times.append(1000 * (time.process_time() - began))
     return times[1:]  # the first one fills caches
-
-
-class Clock:
-    """Adds up the time that functions take."""
-
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(PARTS, 0.0)
-
-    def timed(self, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Return the function with its time added to a part."""
-
-        def call(*arguments: Any, **named: Any) -> Any:
-            began = time.process_time()
-            try:
-                return function(*arguments, **named)
-            finally:
-                self.seconds[part] += time.process_time() - began
-
-        return call
-
-    def watch(self, stack: ExitStack) -> None:
-        """Watch all parts until the stack is closed."""
-        for part, places in PARTS.items():
-            for where, name in places:
-                timed = self.timed(part, getattr(where, name))
-                stack.enter_context(mock.patch.object(where, name, timed))
 
 
 def frames(count: int) -> None:
@@ -130,13 +104,11 @@ def frames(count: int) -> None:
         if falling:
             text += f"; with fog or rain {np.median(np.concatenate(falling)):.2f} ms"
         print(text)
-        clock = Clock()
-        with ExitStack() as stack:
-            clock.watch(stack)
-            total_s = sum(sum(frame_ms(each)) for each in drawn) / 1000
-        # Of the first frame of a scenario the parts count and the sum does not.
-        total_s *= len(HEIGHTS_M) / (len(HEIGHTS_M) - 1)
-        for part, seconds in sorted(clock.seconds.items(), key=lambda item: -item[1]):
+        spent = Shares(PARTS)
+        for each in drawn:
+            spent.measure(functools.partial(frame_ms, each))
+        total_s = sum(spent.seconds.values())
+        for part, seconds in sorted(spent.seconds.items(), key=lambda item: -item[1]):
             print(f"  {100 * seconds / total_s:4.0f} % {part}")
 
 
