@@ -3,8 +3,8 @@
 The modules, in the order in which a session needs them:
 
 1. ``hooks`` has the hooks of pytest and delegates.  Every pytest run imports it, with ``arguments``
-   (options and ini keys as pytest declares them), ``keys`` (of stashes and reports), ``abort``
-   and ``fixtures``.  The other modules are imported once there is something to fly.
+   (options and ini keys as pytest declares them), ``keys`` (of stashes), ``abort`` and
+   ``fixtures``.  The other modules are imported once there is something to fly.
 2. ``options`` reads all options once into one frozen object; ``option_checks`` compares them.
    ``startup`` begins the ``run``: options, ledger, pool and results of this process.
 3. ``collection`` makes the items of each marked test: ``marker`` reads the marker, and a ``target``
@@ -15,7 +15,7 @@ The modules, in the order in which a session needs them:
    the rest from what was flown.
 5. ``outcomes`` decides whether an item passes, fails, xfails or skips.  ``item_facts`` gathers the
    facts (with ``failed_statement`` and ``user_assertions``), and ``item_report`` writes the
-   decision into the report (``report_text``).
+   decision into the report (``report_text``).  What an item says travels as ``item_record``.
 6. ``tally`` counts what reports say, ``save_cases`` saves new violations, ``session_status`` sets
    the exit status, and ``summary`` and ``github_summary`` show all of it.  ``termination`` lets
    SIGTERM end a session as Ctrl-C does.

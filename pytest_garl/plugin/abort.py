@@ -1,6 +1,6 @@
 """End a session that cannot go on: without its ledger or NPC policy no other item can be flown.
 
-A worker of pytest-xdist cannot end the session.  It tells the controller by a user property.
+A worker of pytest-xdist cannot end the session.  It tells the controller in an item's record.
 A session that somebody interrupts ends with its summary.
 """
 
@@ -8,34 +8,41 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from types import TracebackType
-from typing import NoReturn, cast
+from typing import TYPE_CHECKING, NoReturn, cast
 
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.plugin.keys import FATAL
 from pytest_garl.plugin.xdist import is_xdist_worker
+
+if TYPE_CHECKING:
+    from pytest_garl.plugin.item_record import ItemRecord
 
 
 def abort_session(item: pytest.Item, error: GarlError) -> NoReturn:
     """End the session while an item runs."""
     if not is_xdist_worker(item.config):
         pytest.exit(f"garl: {error}", returncode=pytest.ExitCode.INTERNAL_ERROR)
-    item.user_properties.append((FATAL, str(error)))
+    _note(item, error)
     pytest.fail(f"garl: {error}", pytrace=False)
 
 
 def fail_report(report: pytest.TestReport, error: GarlError) -> None:
     """Fail a report whose item has run, and end the session when the report is logged."""
     report.outcome, report.longrepr = "failed", f"garl: {error}"
-    report.user_properties.append((FATAL, str(error)))
+    _note(report, error)
 
 
-def abort_if_reported(report: pytest.TestReport) -> None:
-    """End the session if a report says that it cannot go on."""
-    for key, value in report.user_properties:
-        if key == FATAL:
-            raise pytest.exit.Exception(f"garl: {value}", pytest.ExitCode.INTERNAL_ERROR)
+def abort_if_fatal(record: ItemRecord) -> None:
+    """End the session if an item says that it cannot go on."""
+    if record.fatal:
+        raise pytest.exit.Exception(f"garl: {record.fatal}", pytest.ExitCode.INTERNAL_ERROR)
+
+
+def _note(target: pytest.Item | pytest.TestReport, error: GarlError) -> None:
+    from pytest_garl.plugin.item_record import ItemRecord
+
+    ItemRecord(fatal=str(error)).add_to(target)
 
 
 def drop_entries_without_line(error: BaseException | None) -> None:

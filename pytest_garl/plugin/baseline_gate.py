@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -19,14 +19,8 @@ from pytest_garl.gate.pairs import PairResult
 from pytest_garl.messages import command
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.plugin.abort import abort_session
-from pytest_garl.plugin.keys import (
-    FOUND,
-    GATE,
-    GATE_PLUGIN,
-    GATE_REPORT,
-    RUN,
-    marker_of,
-)
+from pytest_garl.plugin.item_record import ItemRecord
+from pytest_garl.plugin.keys import GATE_PLUGIN, RUN, marker_of
 from pytest_garl.plugin.marker import read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
@@ -53,7 +47,7 @@ class BaselineGateItem(pytest.Item):
         super().__init__(**rest)
         self.garl_gate = base
         self._target = target
-        self.user_properties.append((GATE, base.title))
+        ItemRecord(gate=base.title).add_to(self)
 
     def runtest(self) -> None:
         """Fly and compare."""
@@ -79,25 +73,21 @@ class BaselineGateItem(pytest.Item):
             abort_session(self, error)
         warning = [f"note: {base.warning}"] if base.warning else []
         hint = self._hint(comparison, run.options.baseline)
-        self._report([*report_lines(comparison), *hint, *warning])
+        lines = (*report_lines(comparison), *hint, *warning)
+        found = "" if comparison.passed else "the gate failed"
+        ItemRecord(gate_report=lines, found=found).add_to(self)
         if not comparison.passed:
-            self.user_properties.append((FOUND, "the gate failed"))
             # The summary lists the pairs, so the failure does not.
             pytest.fail("\n".join(summary_lines(comparison)), pytrace=False)
 
     def _refuse(self, differing: Sequence[str]) -> NoReturn:
         """Fail because the landing system is not flown as the baseline was."""
-        lines = [
+        lines = (
             f"gate FAILED: no fair comparison, {'; '.join(differing)}",
             "If the difference is intended, save a new baseline.",
-        ]
-        self._report(lines)
-        self.user_properties.append((FOUND, "the gate refused to compare"))
+        )
+        ItemRecord(gate_report=lines, found="the gate refused to compare").add_to(self)
         pytest.fail("\n".join(lines), pytrace=False)
-
-    def _report(self, lines: Iterable[str]) -> None:
-        """Leave lines for the summary."""
-        self.user_properties += [(GATE_REPORT, line) for line in (self.garl_gate.title, *lines)]
 
     def _hint(self, comparison: Comparison, file: Path | None) -> Iterator[str]:
         """Yield the command that flies the first pair that is worse."""
@@ -121,7 +111,7 @@ class BaselineGatePlugin:
     def __init__(self, options: Options, file: Path, baseline: Baseline) -> None:
         self._options, self._file, self._baseline = options, file, baseline
         self._gates_made: set[tuple[str, str, str]] = set()
-        self._gate_reports: dict[str, list[str]] = {}
+        self._gate_reports: dict[str, ItemRecord] = {}
         self._problem = ""
         self._skipped: list[str] = []
 
@@ -167,10 +157,10 @@ class BaselineGatePlugin:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Remember the lines that a gate reports."""
-        lines = [str(text) for key, text in report.user_properties if key == GATE_REPORT]
-        if lines and report.when == "call":
-            self._gate_reports[report.nodeid] = lines
-        if report.skipped and report.when == "setup" and GATE in dict(report.user_properties):
+        record = ItemRecord.of(report)
+        if record.gate_report and report.when == "call":
+            self._gate_reports[report.nodeid] = record
+        if record.gate and report.skipped and report.when == "setup":
             self._skipped.append(report.nodeid)
 
     def note_missing_gate(self, session: pytest.Session) -> bool:
@@ -218,11 +208,12 @@ class BaselineGatePlugin:
             terminalreporter.write_line(self._problem, red=True)
         for note in environment_changes(self._baseline):
             terminalreporter.write_line(f"note: {note}; it may be the cause of differences")
-        titles = {title for title, *_ in self._gate_reports.values()}
+        titles = {record.gate for record in self._gate_reports.values()}
         for each in self._baseline.sets:
             if each.title not in titles:
                 terminalreporter.write_line(f"note: {each.title} was not flown")
-        for _, (title, result, *lines) in sorted(self._gate_reports.items()):
-            terminalreporter.write_line(f"{title}: {result}")
+        for _, record in sorted(self._gate_reports.items()):
+            result, *lines = record.gate_report
+            terminalreporter.write_line(f"{record.gate}: {result}")
             for line in lines:
                 terminalreporter.write_line(f"    {line}")

@@ -13,7 +13,7 @@ from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import slots
 from pytest_garl.messages import command
 from pytest_garl.plugin.inputs import corpus_of, repeated_slot_of
-from pytest_garl.plugin.keys import COLLECTED, marker_among
+from pytest_garl.plugin.keys import COLLECTED, SLOT_FIXTURE, marker_among
 from pytest_garl.plugin.marker import MarkerArguments, read_marker
 from pytest_garl.plugin.options import options_of
 from pytest_garl.plugin.target import Target
@@ -87,12 +87,12 @@ def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark) -> None:
     targets = targets_for(arguments, metafunc.config, metafunc.definition.originalname)
     if targets:
         ids = [target.name for target in targets]
-        return metafunc.parametrize("garl_slot", targets, ids=ids, indirect=True)
+        return metafunc.parametrize(SLOT_FIXTURE, targets, ids=ids, indirect=True)
     if options.repeat:
         reason = f"--garl-repeat={options.repeat}: this test does not fly it"
     else:
         reason = "no map selected" if options.budget else NOTHING_TO_FLY
-    return metafunc.parametrize("garl_slot", [reason], ids=["nothing"], indirect=True)
+    return metafunc.parametrize(SLOT_FIXTURE, [reason], ids=["nothing"], indirect=True)
 
 
 def _note(metafunc: pytest.Metafunc, arguments: MarkerArguments) -> None:

@@ -9,10 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import printable
-from pytest_garl.plugin.keys import SLOT, TRAJECTORY
+from pytest_garl.plugin.item_record import records
 from pytest_garl.plugin.run import FilmKey, Films, Run
 from pytest_garl.plugin.suggested_commands import shown_path
-from pytest_garl.plugin.terminal_text import begin_line, counted, duration, width_of, wrapped
+from pytest_garl.plugin.terminal_text import (
+    begin_line,
+    counted,
+    duration,
+    listed,
+    width_of,
+    wrapped,
+)
 
 if TYPE_CHECKING:
     from pytest_garl.execution.ledger_queries import LedgerFlight
@@ -21,8 +28,6 @@ if TYPE_CHECKING:
 
 FILM_S = 6.0
 """Computing time of a film, as docs/html-report.md says."""
-MOST_NAMED = 5
-"""A line names so many flights and counts the rest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,13 +106,12 @@ def _drawn(reporter: Any, run: Run, failures: Sequence[_Failure]) -> Films:
 def _failed_cases(reporter: Any, run: Run) -> Iterator[_Failure]:
     """Yield the saved cases of which a test failed, in the order in which they failed."""
     seen = set()
-    for report in reporter.getreports("failed"):
-        properties = dict(report.user_properties)
-        name = str(properties.get(SLOT, ""))
+    for record in records(reporter, "failed"):
+        name = record.slot or ""
         if not name.startswith("case-") or name in seen:
             continue
         seen.add(name)
-        flight = run.ledger.queries.flight_with_hash(str(properties.get(TRAJECTORY, "")))
+        flight = run.ledger.queries.flight_with_hash(record.trajectory_sha256 or "")
         if flight is not None:
             yield _Failure(key=(name,), name=name, flight=flight)
 
@@ -138,16 +142,11 @@ def _missing(found: Iterable[tuple[FilmTask, str]]) -> list[str]:
     for task, problem in found:
         if problem:
             reasons.setdefault(problem, []).append(task.file.stem)
-    return [f"no film of {_listed(names)}: {reason}" for reason, names in reasons.items()]
+    return [f"no film of {listed(names)}: {reason}" for reason, names in reasons.items()]
 
 
 def _beyond(failures: Sequence[_Failure], most: int) -> list[str]:
     if not failures:
         return []
-    names = _listed([each.name for each in failures])
+    names = listed([each.name for each in failures])
     return [f"{most} films are drawn at most; `garl film SLOT` draws the others: {names}"]
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return ", ".join(names[:MOST_NAMED]) + more

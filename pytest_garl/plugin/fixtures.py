@@ -8,20 +8,7 @@ import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin.abort import abort_session
-from pytest_garl.plugin.keys import (
-    BODY_RUNS,
-    EXPECTED,
-    FLIGHT,
-    LANDING,
-    NO_PARAMETERS,
-    OUTCOME,
-    OUTSIDE,
-    RENEWABLE,
-    RUN,
-    SIGNATURE,
-    TRAJECTORY,
-    UNPROVEN,
-)
+from pytest_garl.plugin.keys import BODY_RUNS, LANDING, NO_PARAMETERS, RUN
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.landing import Landing
@@ -59,6 +46,7 @@ def npcs(request: pytest.FixtureRequest) -> PolicySpec | None:
 def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec | None) -> Landing:
     """Return the landing of the item's slot; wait until it is flown."""
     from pytest_garl.plugin.item_facts import another_test_fails, is_known_case
+    from pytest_garl.plugin.item_record import ItemRecord
     from pytest_garl.plugin.item_report import end_unjudged
     from pytest_garl.plugin.landing import Landing
 
@@ -74,24 +62,22 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec 
         getattr(item, "obj", None),
         is_shown_elsewhere=lambda: another_test_fails(run, garl_slot, flight),
     )
-    item.user_properties += [
-        (FLIGHT, garl_slot.flight_key),
-        (OUTCOME, result.outcome),
-        (SIGNATURE, result.signature),
-        ("garl.story", result.verdict.story),
-        ("garl.excuse", result.verdict.excuse_text or result.verdict.excuse),
-        ("garl.final_distance_m", result.final_distance_m),
-        ("garl.elapsed_s", result.elapsed_s),
-        (TRAJECTORY, flight.sha256),
-    ]
-    if is_known_case(run, garl_slot, result):
-        item.user_properties.append((EXPECTED, flight.signature))
-    if outside := garl_slot.outside_domain(run.options.map_folders):
-        item.user_properties.append((OUTSIDE, outside))
-    if reasons := run.unproven(garl_slot):
-        request.node.user_properties.append((UNPROVEN, "; ".join(reasons)))
-    if garl_slot.entry is not None and run.prove_reference(garl_slot):
-        item.user_properties.append((RENEWABLE, garl_slot.entry.path.name))
+    entry = garl_slot.entry
+    renewable = entry.path.name if entry is not None and run.prove_reference(garl_slot) else ""
+    ItemRecord(
+        flight=garl_slot.flight_key,
+        outcome=result.outcome,
+        signature=result.signature,
+        story=result.verdict.story,
+        excuse=result.verdict.excuse_text or result.verdict.excuse,
+        final_distance_m=result.final_distance_m,
+        elapsed_s=result.elapsed_s,
+        trajectory_sha256=flight.sha256,
+        expected=is_known_case(run, garl_slot, result),
+        outside=garl_slot.outside_domain(run.options.map_folders),
+        unproven="; ".join(run.unproven(garl_slot)),
+        renewable=renewable,
+    ).add_to(item)
     item.stash[LANDING] = landing
     if item.stash.get(BODY_RUNS, False):
         # Asked for by the test's body, which must not go on.

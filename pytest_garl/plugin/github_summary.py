@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_garl.plugin.keys import LOST, SEVERITY, SIGNATURE, SLOT, VIOLATED_PROBE
+from pytest_garl.plugin.item_record import ItemRecord
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import repeat_kind_command
 from pytest_garl.plugin.summary import renewal_lines
@@ -44,8 +44,6 @@ SHARES = (
     "crashed",
     "inconclusive",
 )
-_BESIDE = {LOST: "Lost", VIOLATED_PROBE: "Probe"}
-"""Properties of items that fail and are no flight of a search, and what their lines begin with."""
 
 Row = tuple[str, ...]
 
@@ -141,25 +139,26 @@ def _shares(search: SearchRecord) -> tuple[str, ...]:
 
 def _failed_beside(reporter: Any) -> list[str]:
     """Return a line for each violated probe, and each file that nothing can fly any more."""
-    return [
-        f"{_BESIDE[key]}: {escaped(str(value))}"
-        for report in reporter.getreports("failed")
-        for key, value in report.user_properties
-        if key in _BESIDE and report.when == "call"
-    ]
+    lines = []
+    for report in reporter.getreports("failed"):
+        record = ItemRecord.of(report)
+        if report.when == "call":
+            lines += [f"Lost: {escaped(record.lost)}"] if record.lost else []
+            lines += [f"Probe: {escaped(each)}" for each in record.violated_probes]
+    return lines
 
 
 def _failed_cases(reporter: Any) -> list[Row]:
     """Return the saved cases whose tests failed."""
     rows = []
     for report in reporter.getreports("failed"):
-        properties = dict(report.user_properties)
-        slot = str(properties.get(SLOT, ""))
+        record = ItemRecord.of(report)
+        slot = record.slot or ""
         if slot.startswith("case-"):
             headline, _, see_it = _message(report).partition("\n")
             command = see_it.partition(": ")[2]
-            signature, took = str(properties[SIGNATURE]), str(properties.get(SEVERITY, ""))
-            texts = (escaped(text) for text in (slot, signature, "1", headline, took))
+            signature = record.signature or ""
+            texts = (escaped(text) for text in (slot, signature, "1", headline, record.severity))
             rows.append((*texts, code(command), ""))
     return rows
 

@@ -10,7 +10,7 @@ import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin import hookspecs
-from pytest_garl.plugin.abort import abort_if_reported, drop_entries_without_line, fail_report
+from pytest_garl.plugin.abort import abort_if_fatal, drop_entries_without_line, fail_report
 from pytest_garl.plugin.arguments import (
     add_options,
     check_keys,
@@ -22,24 +22,22 @@ from pytest_garl.plugin.fixtures import garl_slot, landing, npcs, scenario
 from pytest_garl.plugin.keys import (
     BODY_RUNS,
     COLLECTED,
-    FINDING_TEST,
     GATE_PLUGIN,
     LANDING,
     RUN,
     TALLY,
-    WORKER_ASSERTION,
     closest_mark,
-    has_slot,
     is_landing_item,
     marker_among,
     marker_of,
-    name_slots,
+    slot_of,
+    takes_landing,
     target_of,
     without_landing,
 )
 from pytest_garl.plugin.lost_cases import Collected
-from pytest_garl.plugin.tally import Tally
-from pytest_garl.plugin.xdist import is_xdist_worker
+from pytest_garl.plugin.tally import Tally, noted_in
+from pytest_garl.plugin.xdist import CONTROLLER, SEED, WIDTH, is_xdist_worker
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
@@ -116,9 +114,8 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(wrapper=True)
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, object]:
     """Make the items of a marked test."""
-    takes_landing = "garl_slot" in metafunc.fixturenames
     marker = closest_mark(metafunc.definition)
-    if not takes_landing:
+    if not takes_landing(metafunc):
         if marker is not None:
             raise pytest.Collector.CollectError(without_landing(metafunc.definition))
         result = yield
@@ -139,7 +136,7 @@ def pytest_make_collect_report(
     report = yield
     if isinstance(collector, pytest.Class):
         for item in report.result or ():
-            if isinstance(item, pytest.Function) and marker_of(item) and not has_slot(item):
+            if isinstance(item, pytest.Function) and marker_of(item) and slot_of(item) is None:
                 report.outcome, report.longrepr = "failed", without_landing(item)
                 report.result = []
                 break
@@ -168,7 +165,10 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     config = session.config
     if config.option.collectonly:
         return
-    name_slots(session.items)
+    if any(slot_of(item) is not None for item in session.items):
+        from pytest_garl.plugin.item_record import name_slots
+
+        name_slots(session.items)
     if is_enabled(config) and not is_xdist_worker(config):
         from pytest_garl.plugin.option_checks import check_selection
         from pytest_garl.plugin.options import options_of
@@ -238,15 +238,15 @@ def pytest_runtest_makereport(
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """End a session without ledger; note the findings of xdist's workers."""
-    abort_if_reported(report)
     worker = getattr(report, "node", None)
-    for key, value in report.user_properties:
-        if key == WORKER_ASSERTION and worker is not None:
-            worker.config.stash[RUN].reported_failures[report.nodeid] = str(value)
-        if key == FINDING_TEST and worker is not None:
-            search, _, signature = str(value).partition(" ")
-            worker.config.stash[RUN].note_finding_test(search, signature, report.nodeid)
     run = worker.config.stash.get(RUN, None) if worker is not None else None
+    record = noted_in(report)
+    if record is not None:
+        abort_if_fatal(record)
+        if run is not None and record.savable:
+            run.note_finding_test(record.search, record.failure_signature, report.nodeid)
+            if record.user_message is not None:
+                run.reported_failures[report.nodeid] = record.failure_signature
     if run is not None and run.investigations is not None:
         _investigate(run)
 
@@ -347,10 +347,10 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
     """Give an xdist worker the run's process and seed, so that a random seed is drawn once."""
-    from pytest_garl.plugin.terminal_text import WIDTH, width_of
+    from pytest_garl.plugin.terminal_text import width_of
 
-    node.workerinput["garl_controller"] = str(os.getpid())
+    node.workerinput[CONTROLLER] = str(os.getpid())
     node.workerinput[WIDTH] = width_of(node.config)
     run = node.config.stash.get(RUN, None)
     if run is not None:
-        node.workerinput["garl_seed"] = str(run.options.seed)
+        node.workerinput[SEED] = str(run.options.seed)

@@ -1,9 +1,8 @@
-"""Write the decided outcome of an item into its report: text, and properties for the summary."""
+"""Write the decided outcome of an item into its report: text, and the fields of its record."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 from pathlib import Path
 
@@ -21,26 +20,8 @@ from pytest_garl.plugin.item_facts import (
     passed_case,
     slot_claim,
 )
-from pytest_garl.plugin.keys import (
-    CASE,
-    DUPLICATE_OF,
-    EXCUSED,
-    FINDING_TEST,
-    LANDING,
-    LEFT_TO_ANOTHER,
-    MAYBE_FIXED,
-    NOT_REPEATED,
-    PAGE,
-    REPORTED_FAILURE,
-    RUN,
-    SEVERITY,
-    SHOWN_VIOLATION,
-    STALE,
-    UNPROVEN,
-    USER_FAILURE,
-    WORKER_ASSERTION,
-    target_of,
-)
+from pytest_garl.plugin.item_record import ItemRecord
+from pytest_garl.plugin.keys import LANDING, RUN, target_of
 from pytest_garl.plugin.outcomes import (
     Decision,
     FailedItem,
@@ -52,7 +33,6 @@ from pytest_garl.plugin.report_text import FailureText
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.target import Target
-from pytest_garl.plugin.xdist import is_xdist_worker
 from pytest_garl.reports.html.naming import page_address, page_name
 
 
@@ -118,11 +98,9 @@ class _Writer:
     def write_failure(self, error: BaseException) -> None:
         """Write the outcome of a test that failed."""
         failure = failure_of_item(self.item, self.target, self.result, error)
-        if failure is not None and self.case is None and not self.result.inconclusive:
-            self._note_user_failure(failure)
+        if failure is not None:
+            self._note_failure(failure)
         facts = failed_item(self.run, self.target, self.result, failure)
-        if failure is not None and not failure.user_property:
-            self._note(SHOWN_VIOLATION, self.target.flight_key)
         gather = failure_facts(self.run, self.target, failure, self.item.nodeid)
         decision, facts = resolve(facts, gather)
         if decision.reason is Reason.TEST_ERROR:
@@ -138,12 +116,12 @@ class _Writer:
 
     def write_left(self) -> None:
         """Note that another test of the slot reports the violation; the session checks that."""
-        self._note(LEFT_TO_ANOTHER, self.target.flight_key)
+        ItemRecord(left_to_another=True).add_to(self.report)
 
     def write_pass(self) -> None:
         """Write the outcome of a test that passed; only a saved case has more to say."""
         # The fixture ``landing`` has found it out.
-        unproven = str(dict(self.item.user_properties).get(UNPROVEN, ""))
+        unproven = ItemRecord.of(self.item).unproven
         facts = passed_case(self.run, self.target, self.result, unproven)
         if facts is None:
             return None
@@ -152,9 +130,9 @@ class _Writer:
         if decision.outcome == "xfailed":
             return self._expect(report_text.passing_edge(facts.case, file))
         if decision.reason is Reason.STALE:
-            self._note(STALE, f"{file} passes, but {unproven}")
+            ItemRecord(stale=f"{file} passes, but {unproven}").add_to(self.report)
         elif decision.reason is Reason.MAYBE_FIXED:
-            self._note(MAYBE_FIXED, file)
+            ItemRecord(maybe_fixed=file).add_to(self.report)
         if decision.outcome == "failed":
             self.report.outcome = "failed"
             self.report.longrepr = report_text.passing_failure(decision, file, unproven)
@@ -164,41 +142,39 @@ class _Writer:
         self, case: Case, failure: ItemFailure, decision: Decision, facts: FailedItem
     ) -> None:
         file = self._case_file
-        self._note(CASE, file)
-        if self.result.severity is not None and not failure.user_property:
-            severity = self.result.severity
-            self._note(SEVERITY, severity.text if case.is_shrunk else severity.unusual)
+        took, severity = "", self.result.severity
+        if severity is not None and not failure.user_property:
+            took = severity.text if case.is_shrunk else severity.unusual
+        ItemRecord(failing_case=file, severity=took).add_to(self.report)
         if decision.outcome == "xfailed":
             return self._expect(report_text.expected_failure(decision, facts, file))
         flown = (failure.signature, self.result.verdict.story)
         return self._fail(report_text.case_text(decision, case, file, self.item.config, flown))
 
     def _write_violation(self, failure: ItemFailure, decision: Decision, facts: FailedItem) -> None:
-        target = self.target
-        key = failure.key(target.search)
-        if decision.reason is Reason.NOT_REPEATED:
-            slot = [target.system_name, target.map, target.name, failure.signature]
-            self._note(NOT_REPEATED, json.dumps(slot))
-        elif decision.reason is Reason.DUPLICATE:
-            self._note(DUPLICATE_OF, key)
-        elif decision.reason is Reason.EXPECTED:
-            self._note_excuse(failure.signature, str(facts.expected_by))
+        target, reason = self.target, decision.reason
+        key, failed = failure.key(target.search), decision.outcome == "failed"
+        ItemRecord(
+            reported_failure=key if failed else "",
+            duplicate_of=key if reason is Reason.DUPLICATE else "",
+            excused_by=self._known_file(facts) if reason is Reason.EXPECTED else "",
+            not_repeated=reason is Reason.NOT_REPEATED,
+            savable=failed and failure.savable,
+        ).add_to(self.report)
         if self.run.options.report is not None:
             self._note_page(self.run.options.report, failure.signature)
-        if decision.outcome == "xfailed":
+        if not failed:
             return self._expect(report_text.expected_failure(decision, facts, ""))
-        self._note(REPORTED_FAILURE, key)
-        self._note_finding_test(failure)
+        if failure.savable:
+            self._note_finding_test(failure)
         return self._fail(
             report_text.violation_text(self.item, self.run, target, failure, self.result, facts)
         )
 
-    def _note_excuse(self, signature: str, name: str) -> None:
-        """Note the file of the known case that excuses a violation, for the summary."""
-        target = self.target
-        file = folder_of(self.run.corpus.folder, target.system_name) / name
-        slot = [target.system_name, target.map, target.name]
-        self._note(EXCUSED, json.dumps([*slot, signature, shown_path(file, self.item.config)]))
+    def _known_file(self, facts: FailedItem) -> str:
+        """Return the file of the known case that excuses a violation."""
+        folder = folder_of(self.run.corpus.folder, self.target.system_name)
+        return shown_path(folder / str(facts.expected_by), self.item.config)
 
     def _note_page(self, folder: Path, signature: str) -> None:
         """Note where the page of a violation will be, for JUnit XML.
@@ -213,32 +189,31 @@ class _Writer:
         shown = os.path.relpath(file, config.rootpath)
         address = f"{url}/{file.relative_to(folder).as_posix()}" if url else shown
         # JUnit XML has the properties and the output of the last report, that of the teardown.
-        self.item.user_properties.append((PAGE, address))
+        ItemRecord(page=address).add_to(self.item)
         self.item.add_report_section("call", "stdout", f"[[ATTACHMENT|{file.absolute()}]]\n")
 
-    def _note_user_failure(self, failure: ItemFailure) -> None:
-        """Note a failure of the user's own property for the summary, whatever its outcome is."""
-        target, failed = self.target, failure.failed_assertion
-        if failure.user_property and failed is not None:
-            slot = [target.search, target.name]
-            self._note(USER_FAILURE, json.dumps([*slot, failure.signature, failed.message]))
+    def _note_failure(self, failure: ItemFailure) -> None:
+        """Note what an item shows, whatever its outcome is; the summary counts users' properties.
+
+        It does not count them of saved cases and of flights that were not decided.
+        """
+        counts = failure.user_property and self.case is None and not self.result.inconclusive
+        failed = failure.failed_assertion if counts else None
+        ItemRecord(
+            system=self.target.system_name,
+            map=self.target.map,
+            search=self.target.search,
+            failure_signature=failure.signature,
+            user_message=failed.message if failed is not None else None,
+            shows_violation=not failure.user_property,
+        ).add_to(self.report)
 
     def _note_finding_test(self, failure: ItemFailure) -> None:
         """Remember which test found a violation: it judges the case that is saved."""
-        if not failure.savable:
-            return
         run, search = self.run, self.target.search
-        worker = is_xdist_worker(self.item.config)
         if failure.user_property:
             run.user_assertions[search, failure.signature] = failure.assertion
-            if worker:
-                self._note(WORKER_ASSERTION, failure.signature)
         run.note_finding_test(search, failure.signature, self.item.nodeid)
-        if worker:
-            self._note(FINDING_TEST, f"{search} {failure.signature}")
-
-    def _note(self, key: str, value: str) -> None:
-        self.report.user_properties.append((key, value))
 
     def _expect(self, reason: str) -> None:
         """Make the failure an expected one."""

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_garl.plugin.keys import FOUND, LOST
 from pytest_garl.plugin.xdist import is_xdist_worker
 
 if TYPE_CHECKING:
@@ -111,11 +110,13 @@ def collection_of(config: pytest.Config, options: Options, collected: Collected)
 
 
 def _item(session: pytest.Session, path: Path, reason: str) -> LostCaseItem:
+    from pytest_garl.plugin.item_record import ItemRecord
+
     file = _LostFile.from_parent(session, path=path)
     item = LostCaseItem.from_parent(file, name="lost")
     item.reason = reason
     # `-m garl` selects it, as the tests that should fly the case.
     item.add_marker("garl")
-    item.user_properties.append((LOST, f"{item.nodeid.partition('::')[0]}: {reason}"))
-    item.user_properties.append((FOUND, "nothing flies this case"))
+    lost = f"{item.nodeid.partition('::')[0]}: {reason}"
+    ItemRecord(lost=lost, found="nothing flies this case").add_to(item)
     return item

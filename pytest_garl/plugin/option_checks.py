@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 
 import pytest
 
-from pytest_garl.plugin.keys import is_landing_item
+from pytest_garl.plugin.keys import is_landing_item, takes_landing
 from pytest_garl.plugin.options import Options
 
 SEARCH_OPTIONS = (
@@ -31,10 +31,9 @@ def check_usage(options: Options) -> None:
         raise pytest.UsageError(problem)
 
 
-def check_selection(options: Options, items: Iterable[pytest.Item]) -> None:
+def check_selection(options: Options, items: Sequence[pytest.Item]) -> None:
     """Raise UsageError if no selected test flies the maps or the slot of the command line."""
-    landings = [item for item in items if "garl_slot" in getattr(item, "fixturenames", ())]
-    if not landings or any(is_landing_item(item) for item in items):
+    if any(map(is_landing_item, items)) or not any(map(takes_landing, items)):
         return
     if "repeat" in options.given:
         raise pytest.UsageError(

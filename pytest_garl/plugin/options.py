@@ -23,7 +23,7 @@ from pytest_garl.plugin.option_values import (
     report_url,
     wrong,
 )
-from pytest_garl.plugin.xdist import given_by_controller, is_xdist_worker
+from pytest_garl.plugin.xdist import CONTROLLER, SEED, given_by_controller, is_xdist_worker
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.search.method_catalogue import default_policy, find_method, method_names
 
@@ -189,7 +189,7 @@ def population(budget: int) -> int:
 
 def controller_of(config: pytest.Config) -> str:
     """Return the id of the process that the run belongs to: xdist's controller, or this one."""
-    return str(given_by_controller(config).get("garl_controller", os.getpid()))
+    return str(given_by_controller(config).get(CONTROLLER, os.getpid()))
 
 
 def _value(config: pytest.Config, option: Option) -> str:
@@ -282,8 +282,8 @@ def _npcs(text: str) -> str:
 
 def _seed(config: pytest.Config, text: str) -> int:
     given = given_by_controller(config)
-    if "garl_seed" in given:
-        return int(given["garl_seed"])
+    if SEED in given:
+        return int(given[SEED])
     if text == "random":
         import secrets
 

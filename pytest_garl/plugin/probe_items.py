@@ -31,7 +31,8 @@ from pytest_garl.messages import command
 from pytest_garl.npcs.domain_policy import NOBODY
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.plugin.abort import abort_session
-from pytest_garl.plugin.keys import FOUND, RUN, VIOLATED_PROBE, target_of
+from pytest_garl.plugin.item_record import ItemRecord
+from pytest_garl.plugin.keys import RUN, target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
@@ -118,10 +119,12 @@ class ProbesItem(pytest.Item):
             return
         system, map = self._target.system.__name__, self._target.map
         number = f"{len(flown.violated)} of {counted(len(lines), 'probe')}"
-        self.user_properties.append((FOUND, f"violates {number}"))
+        ItemRecord(
+            found=f"violates {number}",
+            violated_probes=tuple(f"{system} on {map}: {each.line}" for each in flown.violated),
+        ).add_to(self)
         lines = [f"{system} violates {number} on {map}:", *lines]
         for each in flown.violated:
-            self.user_properties.append((VIOLATED_PROBE, f"{system} on {map}: {each.line}"))
             file = write_text_atomically(
                 run.options.folder / "probes" / f"{map}-{each.probe.name}.toml",
                 dump_scenario(each.probe.scenario),

@@ -17,7 +17,7 @@ from pytest_garl.messages import shortened
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.tally import Tally
-from pytest_garl.plugin.terminal_text import counted
+from pytest_garl.plugin.terminal_text import counted, listed
 from pytest_garl.reports.run_record import SearchRecord
 
 FLIGHTS_PER_EXCEPTION = 20
@@ -26,8 +26,6 @@ _ASK_FOR_FLIGHTS = ("budget", "map", "repeat")
 """Options of the command line that ask a session for flights, whatever its tests are."""
 MESSAGE_CHARS = 300
 """Characters of an unexpected error's message that a line shows."""
-MOST_NAMED = 5
-"""A sentence names so many flights and counts the rest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +106,7 @@ def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
     if excused:
         yield (
             f"{counted(len(excused), 'test')} excused by a failure that no test shows (its test "
-            f"was skipped, passed or was expected to fail): {_names(excused)}"
+            f"was skipped, passed or was expected to fail): {listed(excused)}"
         )
     if run is not None and run.options.searches_or_repeats:
         searches = tally.run_record(run).searches
@@ -125,7 +123,7 @@ def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
 
 def notes(tally: Tally) -> Iterator[str]:
     """Yield what a green session leaves open."""
-    if tally.items and not tally.flown and not tally.gated:
+    if tally.items and not tally.flown and not any(each.gate_report for each in tally.records):
         yield f"nothing was flown: {_why_nothing_flew(tally)}"
     yield from _hidden(tally)
     for search in tally.record.searches if tally.record else ():
@@ -133,7 +131,7 @@ def notes(tally: Tally) -> Iterator[str]:
             yield f"{search.name}: landed in none of {counted(search.flown, 'flight')}"
     for (system, map), slots in sorted(_unrepeated_by_search(tally).items()):
         violations = counted(len(slots), "violation")
-        yield f"{_search(system, map)}: {violations} did not repeat: {_names(slots)}"
+        yield f"{_search(system, map)}: {violations} did not repeat: {listed(slots)}"
 
 
 def _flights_were_asked_for(tally: Tally, options: Options) -> bool:
@@ -153,7 +151,7 @@ def _hidden(tally: Tally) -> Iterator[str]:
     if tally.hidden:
         found = [f"{nodeid} ({text})" for nodeid, text in sorted(tally.hidden.items())]
         yield (
-            f"{counted(len(found), 'failure')} hidden by a mark xfail or by a hook: {_names(found)}"
+            f"{counted(len(found), 'failure')} hidden by a mark xfail or by a hook: {listed(found)}"
         )
 
 
@@ -172,7 +170,7 @@ def _inconclusive(searches: Sequence[SearchRecord]) -> Iterator[str]:
         if len(slots) > allowed:
             yield (
                 f"{search.name}: {len(slots)} of {flown} flights are inconclusive, "
-                f"at most {allowed} may be: {_names(slots)}. Fly them while the machine has "
+                f"at most {allowed} may be: {listed(slots)}. Fly them while the machine has "
                 "nothing else to do, or allow more time with --garl-timeout"
             )
 
@@ -196,21 +194,18 @@ def _unrepeated(tally: Tally, searches: Sequence[SearchRecord]) -> Iterator[str]
         if len(slots) > allowed:
             yield (
                 f"{_search(system, map)}: {len(slots)} violations in {flights} flights did not "
-                f"repeat, at most {allowed} may: {_names(slots)}"
+                f"repeat, at most {allowed} may: {listed(slots)}"
             )
 
 
 def _unrepeated_by_search(tally: Tally) -> dict[tuple[str, str], list[str]]:
     found: dict[tuple[str, str], set[str]] = {}
-    for system, map, slot, signature in tally.not_repeated:
-        found.setdefault((system, map), set()).add(f"{slot} ({signature})")
+    for each in tally.records:
+        if each.not_repeated:
+            slot = f"{each.slot} ({each.failure_signature})"
+            found.setdefault((each.system, each.map), set()).add(slot)
     return {search: sorted(slots) for search, slots in found.items()}
 
 
 def _search(system: str, map: str) -> str:
     return f"{system.split(':')[-1]} on {map}"
-
-
-def _names(names: Sequence[str]) -> str:
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return ", ".join(names[:MOST_NAMED]) + more

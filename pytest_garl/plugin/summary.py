@@ -13,7 +13,7 @@ from pytest_garl.cases.reference_proofs import renewal_line
 from pytest_garl.messages import command
 from pytest_garl.plugin.failure_films import film_lines
 from pytest_garl.plugin.header import cpu_dispatch_warning
-from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, OUTSIDE, RENEWABLE, STALE
+from pytest_garl.plugin.item_record import records
 from pytest_garl.plugin.landing import NOT_JUDGED
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
@@ -76,8 +76,10 @@ def write_status(reporter: Any, tally: Tally) -> None:
 def _excused_lines(tally: Tally, width: int) -> list[str]:
     """Return a line for each kind that a known case excuses, with the file of the case."""
     slots: dict[tuple[str, str, str, str], set[str]] = {}
-    for system, map, slot, ending, file in tally.excused:
-        slots.setdefault((system, map, ending, file), set()).add(slot)
+    for each in tally.records:
+        if each.excused_by:
+            kind = (each.system, each.map, each.failure_signature, each.excused_by)
+            slots.setdefault(kind, set()).add(each.slot or "")
     return [
         wrapped(
             f"known: {system.split(':')[-1]} on {map}: {ending} in "
@@ -91,9 +93,10 @@ def _excused_lines(tally: Tally, width: int) -> list[str]:
 
 def _passing_cases(reporter: Any) -> list[str]:
     """Return a line for each open case of which some test passed and none failed."""
-    failing = _property_values(reporter, ("failed", "xfailed"), CASE)
-    fixed = _property_values(reporter, ("passed",), MAYBE_FIXED) - failing
-    stale = _property_values(reporter, ("passed",), STALE)
+    failing = {each.failing_case for each in records(reporter, "failed", "xfailed")}
+    passing = [*records(reporter, "passed")]
+    fixed = {each.maybe_fixed for each in passing} - {"", *failing}
+    stale = {each.stale for each in passing} - {""}
     promote = {file: command("garl", "cases", "promote", file) for file in sorted(fixed)}
     return [
         *(
@@ -106,28 +109,17 @@ def _passing_cases(reporter: Any) -> list[str]:
 
 def renewal_lines(reporter: Any) -> list[str]:
     """Return the line that tells of cases with another version's hash that fly as recorded."""
-    outcomes = ("passed", "failed", "xfailed", "skipped", "error")
-    line = renewal_line(len(_property_values(reporter, outcomes, RENEWABLE)))
+    reported = records(reporter, "passed", "failed", "xfailed", "skipped", "error")
+    line = renewal_line(len({each.renewable for each in reported} - {""}))
     return [line] if line else []
 
 
 def _cases_outside(reporter: Any) -> list[str]:
     """Return a line for each case whose values lie outside the domain of its test."""
-    outside = _property_values(reporter, ("passed", "failed", "xfailed", "skipped"), OUTSIDE)
+    reported = records(reporter, "passed", "failed", "xfailed", "skipped")
+    outside = {each.outside for each in reported} - {""}
     width = width_of(reporter.config)
     return [wrapped(f"flown, although {text}", width, others="  ") for text in sorted(outside)]
-
-
-def _property_values(reporter: Any, outcomes: tuple[str, ...], key: str) -> set[str]:
-    """Return the values of a user property in the reports with some outcomes."""
-    reports = [report for outcome in outcomes for report in reporter.getreports(outcome)]
-    return {
-        str(value)
-        for report in reports
-        # Among the skipped ones are modules skipped at collection, whose reports have none.
-        for name, value in getattr(report, "user_properties", ())
-        if name == key
-    }
 
 
 def _lines_about(record: RunRecord, run: Run, tally: Tally, reporter: Any) -> list[str]:

@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
-import json
+import itertools
 from collections import Counter
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_garl.plugin.keys import (
-    DUPLICATE_OF,
-    EXCUSED,
-    EXPECTED,
-    FLIGHT,
-    FOUND,
-    GATE_REPORT,
-    LEFT_TO_ANOTHER,
-    NO_FLIGHT,
-    NOT_REPEATED,
-    OUTCOME,
-    REPORTED_FAILURE,
-    SHOWN_VIOLATION,
-    SIGNATURE,
-    SLOT,
-    USER_FAILURE,
-)
+from pytest_garl.plugin.keys import RECORD_PREFIX
 
 if TYPE_CHECKING:
     from pytest_garl.execution.facts import UserFailure
+    from pytest_garl.plugin.item_record import ItemRecord
     from pytest_garl.plugin.run import Run
     from pytest_garl.reports.run_record import RunRecord
+
+
+def noted_in(report: pytest.TestReport) -> ItemRecord | None:
+    """Return what an item says in a report, None if that is nothing, as in most suites."""
+    if not any(str(name).startswith(RECORD_PREFIX) for name, _ in report.user_properties):
+        return None
+    from pytest_garl.plugin.item_record import ItemRecord
+
+    return ItemRecord.of(report)
 
 
 class Tally:
@@ -40,11 +34,6 @@ class Tally:
         self.items: set[str] = set()
         self.no_flight: Counter[str] = Counter()
         self.flown = False
-        self.gated = False
-        """Whether a baseline's gate has flown."""
-        self.not_repeated: set[tuple[str, ...]] = set()
-        self.excused: set[tuple[str, ...]] = set()
-        """System, map, slot, ending and file of each violation that a known case excuses."""
         self.problems: list[str] = []
         self.tests_ran = False
         """Whether pytest ran all selected tests, and did not only collect them."""
@@ -53,15 +42,10 @@ class Tally:
         would have failed for what was found may be among the others."""
         self.interrupted = False
         """Whether somebody ended the session with Ctrl-C or SIGTERM."""
-        self.hidden: dict[str, str] = {}
-        """What pytest-garl's own items found that pytest does not report as a failure."""
         self._signatures: dict[str, str] = {}
         self._failing_flights: set[str] = set()
-        self._failures: dict[str, str] = {}
-        self._excused: dict[str, set[str]] = {}
-        self._shown: dict[str, str] = {}
-        self._left_to_others: dict[str, str] = {}
-        self._user_failures: dict[str, list[str]] = {}
+        self._said: dict[str, list[tuple[pytest.TestReport, ItemRecord]]] = {}
+        """What each item says of its call; a test with subtests reports more than once."""
         self.record: RunRecord | None = None
         """What was found, once all has been flown."""
 
@@ -69,47 +53,23 @@ class Tally:
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Remember what decides the exit status and what the summary shows."""
         if report.when == "setup":
-            # A test that runs again reports anew; one with subtests reports more than once.
-            self._failures.pop(report.nodeid, None)
-            for noted in (self._user_failures, self._shown, self._left_to_others, self.hidden):
-                noted.pop(report.nodeid, None)
-        properties = dict(report.user_properties)
-        self.gated = self.gated or GATE_REPORT in properties
-        if FOUND in properties and report.when == "call" and not report.failed:
-            self.hidden[report.nodeid] = str(properties[FOUND])
-        if FLIGHT in properties:
-            self._note_flight(str(properties[FLIGHT]), report, properties)
-        if SLOT not in properties or report.when == "teardown":
+            # A test that runs again reports anew.
+            self._said.pop(report.nodeid, None)
+        record = noted_in(report)
+        if record is None:
             return
-        if NO_FLIGHT in properties and report.nodeid not in self.items:
-            self.no_flight[str(properties[NO_FLIGHT])] += 1
-        self.items.add(report.nodeid)
-        self.flown = self.flown or OUTCOME in properties
-        if REPORTED_FAILURE in properties and report.failed:
-            self._failures[report.nodeid] = str(properties[REPORTED_FAILURE])
-        if SHOWN_VIOLATION in properties and (report.failed or hasattr(report, "wasxfail")):
-            self._shown[report.nodeid] = str(properties[SHOWN_VIOLATION])
-        if LEFT_TO_ANOTHER in properties and report.skipped:
-            self._left_to_others[report.nodeid] = str(properties[LEFT_TO_ANOTHER])
-        if DUPLICATE_OF in properties and report.skipped:
-            self._excused.setdefault(str(properties[DUPLICATE_OF]), set()).add(report.nodeid)
-        if USER_FAILURE in properties:
-            self._user_failures.setdefault(report.nodeid, []).append(str(properties[USER_FAILURE]))
-        if EXCUSED in properties:
-            self.excused.add(tuple(json.loads(str(properties[EXCUSED]))))
-        if NOT_REPEATED in properties:
-            self.not_repeated.add(tuple(json.loads(str(properties[NOT_REPEATED]))))
-
-    def _note_flight(
-        self, flight: str, report: pytest.TestReport, properties: Mapping[str, object]
-    ) -> None:
-        """Note whether a flight violates something, and whether an item fails for it."""
-        if properties.get(SIGNATURE) and EXPECTED not in properties:
-            self._signatures[flight] = str(properties[SIGNATURE])
-        # An item that pytest-garl excuses shows its violation; a mark xfail of the test's hides it.
-        excused = SHOWN_VIOLATION in properties and hasattr(report, "wasxfail")
-        if report.failed or excused:
-            self._failing_flights.add(flight)
+        if report.when == "call":
+            self._said.setdefault(report.nodeid, []).append((report, record))
+        if record.flight:
+            if record.signature and not record.expected:
+                self._signatures[record.flight] = record.signature
+            if report.failed or _shows_violation(report, record):
+                self._failing_flights.add(record.flight)
+        if record.slot is not None and report.when != "teardown":
+            if record.no_flight and report.nodeid not in self.items:
+                self.no_flight[record.no_flight] += 1
+            self.items.add(report.nodeid)
+            self.flown = self.flown or record.outcome is not None
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtestloop(self, session: pytest.Session) -> Generator[None, object, object]:
@@ -127,15 +87,33 @@ class Tally:
             ignore_further_sigterm()
 
     @property
+    def records(self) -> list[ItemRecord]:
+        """What the items say of their calls."""
+        return [record for _, record in self._calls()]
+
+    @property
+    def hidden(self) -> dict[str, str]:
+        """What pytest-garl's own items found that pytest does not report as a failure."""
+        return {
+            report.nodeid: record.found
+            for report, record in self._calls()
+            if record.found and not report.failed
+        }
+
+    @property
     def user_failures(self) -> list[UserFailure]:
         """The failed assertions about users' own properties, expected ones among them."""
         from pytest_garl.execution.facts import UserFailure
 
-        names = ("search", "slot", "signature", "message")
         return [
-            UserFailure(**dict(zip(names, json.loads(text), strict=True)))
-            for texts in self._user_failures.values()
-            for text in texts
+            UserFailure(
+                search=record.search,
+                slot=record.slot or "",
+                signature=record.failure_signature,
+                message=record.user_message,
+            )
+            for record in self.records
+            if record.user_message is not None
         ]
 
     def run_record(self, run: Run) -> RunRecord:
@@ -164,9 +142,26 @@ class Tally:
 
     def wrongly_excused(self) -> list[str]:
         """Return the items that are excused by a failure that no item reports."""
-        reported, shown = set(self._failures.values()), set(self._shown.values())
-        excused = {
-            item for key, items in self._excused.items() if key not in reported for item in items
-        }
-        left = {item for item, slot in self._left_to_others.items() if slot not in shown}
-        return sorted(excused | left)
+        calls = [*self._calls()]
+        reported = {"", *(record.reported_failure for report, record in calls if report.failed)}
+        shown = {record.flight for report, record in calls if _shows_violation(report, record)}
+        return sorted(
+            {
+                report.nodeid
+                for report, record in calls
+                if report.skipped
+                if record.duplicate_of not in reported
+                or (record.left_to_another and record.flight not in shown)
+            }
+        )
+
+    def _calls(self) -> Iterator[tuple[pytest.TestReport, ItemRecord]]:
+        return itertools.chain.from_iterable(self._said.values())
+
+
+def _shows_violation(report: pytest.TestReport, record: ItemRecord) -> bool:
+    """Whether an item fails for a violation, or pytest-garl excuses it.
+
+    A mark xfail of the test's hides the violation.
+    """
+    return record.shows_violation and (report.failed or hasattr(report, "wasxfail"))

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from typing import Any
 
 import pytest
 
-from pytest_garl.plugin.xdist import given_by_controller
+from pytest_garl.plugin.xdist import WIDTH, given_by_controller
 
-WIDTH = "garl_width"
-"""The key under which xdist's controller gives its workers the width of the terminal."""
+MOST_NAMED = 5
+"""A line names so many flights and counts the rest."""
 _NARROW = 40
 _HARD_SPACE = "\N{NO-BREAK SPACE}"
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|m/s|m|s)(?!\w))")
@@ -43,6 +43,12 @@ def wrapped(text: str, width: int, *, first: str = "", others: str = "") -> str:
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun: ``1 flight``, ``2 flights``."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the first names, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more
 
 
 def duration(seconds: float) -> str:

@@ -10,7 +10,7 @@ import pytest
 
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.messages import python_that_lacks
-from pytest_garl.plugin.keys import marker_of
+from pytest_garl.plugin.keys import marker_of, takes_landing
 from pytest_garl.plugin.marker import read_marker
 from pytest_garl.plugin.options import options_of
 from pytest_garl.plugin.target import Target
@@ -33,7 +33,7 @@ class _Collector:
     def pytest_collection_finish(self, session: pytest.Session) -> None:
         for item in session.items:
             marker = marker_of(item)
-            if marker is None or "garl_slot" not in getattr(item, "fixturenames", ()):
+            if marker is None or not takes_landing(item):
                 continue
             arguments = read_marker(marker, options_of(session.config))
             self.targets += [(arguments.on(map), arguments.map_folders) for map in arguments.maps]
