@@ -131,7 +131,7 @@ def _lines_about(record: RunRecord, run: Run, tally: Tally, reporter: Any) -> li
         for each in record.searches
         for line in search_table(each, reporter.config, width, _films_of(run, each))
     ]
-    types = legend((*record.kinds, *record.findings))
+    types = legend((*record.kinds, *(finding for _, finding in record.findings)))
     lines += [wrapped(text, width) for text in (types, _costs(record, run.options)) if text]
     lines += _not_finished(record, run, tally)
     worlds = dict.fromkeys(_world(search) for search in record.searches if search.key.domain)

@@ -119,16 +119,17 @@ class Tally:
     def run_record(self, run: Run) -> RunRecord:
         """Return the record of the run, read once when all has been flown."""
         if self.record is None:
-            from pytest_garl.reports.run_reading import SessionFindings, record_of
+            from pytest_garl.reports.run_reading import record_of
 
             if run.options.searches_or_repeats:
                 run.ledger.facts.note_user_failures(self.user_failures)
                 run.ledger.facts.note_ended()
-            found = SessionFindings(
-                cases=tuple(each.result.case for each in run.investigated if each.result.case),
+            self.record = record_of(
+                run.ledger,
+                run.corpus,
+                investigated=[each.result.case for each in run.investigated if each.result.case],
                 confirming=run.investigations.flown if run.investigations else 0,
             )
-            self.record = record_of(run.ledger, run.corpus, found)
         return self.record
 
     @property

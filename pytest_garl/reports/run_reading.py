@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
@@ -34,18 +33,6 @@ from pytest_garl.reports.run_record import (
 _NONE: Mapping[str, tuple[Severity, str]] = MappingProxyType({})
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SessionFindings:
-    """What a session of pytest knows of its run beside the ledger.
-
-    ``cases`` are those that it investigated, saved or not; ``confirming`` is the number of flights
-    that this took.
-    """
-
-    cases: tuple[Case, ...] = ()
-    confirming: int = 0
-
-
 def read_run(path: Path, corpus: Corpus, *, checked: bool = False) -> RunRecord:
     """Return the run in the ledger at ``path``, finished or not.
 
@@ -58,13 +45,15 @@ def read_run(path: Path, corpus: Corpus, *, checked: bool = False) -> RunRecord:
         return record_of(ledger, corpus)
 
 
-def record_of(ledger: Ledger, corpus: Corpus, session: SessionFindings | None = None) -> RunRecord:
+def record_of(
+    ledger: Ledger, corpus: Corpus, *, investigated: Sequence[Case] = (), confirming: int = 0
+) -> RunRecord:
     """Return the run in an open ledger, with the causes that the saved cases tell.
 
-    A session that has just flown it may know more.
+    A session that has just flown it knows more: the cases that it investigated, saved or not, and
+    how many flights confirmed and shrank them.
     """
     facts, queries = ledger.facts, ledger.queries
-    session = session or SessionFindings()
     progress, meters = queries.progress(), queries.meters()
     jobs: dict[str, FlightJob] = {}
     searches = _searches(ledger, jobs)
@@ -84,12 +73,12 @@ def record_of(ledger: Ledger, corpus: Corpus, session: SessionFindings | None = 
             flown_again=int(meters.get("retried", 0)),
             beside=int(meters.get("on_demand", 0)),
             twins=facts.twins,
-            confirming=session.confirming,
+            confirming=confirming,
             flights=int(meters.get("flights", 0)),
             flying_s=meters.get("flying_s", 0.0),
             idle_s=meters.get("idle_s", 0.0),
         ),
-        searches=tuple(each.with_cases(cases, session.cases) for each in searches),
+        searches=tuple(each.with_cases(cases, investigated) for each in searches),
         cases=cases,
         jobs=jobs,
     )

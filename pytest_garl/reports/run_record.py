@@ -39,9 +39,12 @@ _BLOCKED = "The marker was blocked"
 """In the story of a flight in which something never left the marker free for long enough."""
 LANDED, IDLE, INCONCLUSIVE = "landed", "idle", "inconclusive"
 """Ends of flights that violate nothing; idle is one in which nobody could have landed."""
-PHASES = ("take-off", "transit", "search", "approach", "descent", "last-metre", "standing")
-"""Phases of a landing (``verdicts/evidence.py``), in its order."""
 NO_PHASE = "not of a phase"
+PHASES = (
+    *("take-off", "transit", "search", "approach", "descent", "last-metre", "standing"),
+    NO_PHASE,
+)
+"""Phases of a landing (``verdicts/evidence.py``), in its order, and what may begin in any."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -419,9 +422,9 @@ class RunRecord:
         return tuple(kind for search in self.searches for kind in search.kinds)
 
     @property
-    def findings(self) -> tuple[KindRecord, ...]:
-        """The findings of all searches."""
-        return tuple(finding for search in self.searches for finding in search.findings)
+    def findings(self) -> tuple[tuple[SearchRecord, KindRecord], ...]:
+        """The findings of all searches, each with its search."""
+        return tuple((search, each) for search in self.searches for each in search.findings)
 
     @property
     def violating(self) -> int:
@@ -444,7 +447,7 @@ class RunRecord:
         return sum(sum(search.crashes.values()) for search in self.searches)
 
     @property
-    def archive(self) -> Mapping[str, Mapping[str, int]]:
+    def archive(self) -> Mapping[str, Counter[str]]:
         """How many flights have which type of violation, by the phase in which it begins."""
         counts: dict[str, Counter[str]] = {}
         for kind in self.kinds:

@@ -30,6 +30,14 @@ def page_link(kind: KindRow, folder: Path, url: str) -> str:
 
 def index_parts(page: RunPage, folder: Path, url: str) -> list[str]:
     """Return the parts of a summary: where the pages are, pictures, archive, domain and cost."""
+    from pytest_garl.reports.html.run_page import (
+        archive_rows,
+        cost_rows,
+        domain_rows,
+        origin_rows,
+    )
+    from pytest_garl.reports.run_record import PHASES
+
     if url:
         where = f"[The whole report]({url}/{INDEX})"
     else:
@@ -39,13 +47,16 @@ def index_parts(page: RunPage, folder: Path, url: str) -> list[str]:
         )
     parts = [where, *(escaped(note) for note in page.notes)]
     parts += _pictures(page, url) if url else []
-    if page.archive:
-        rows = [
-            (escaped(row.type), *(str(count or "") for count, _ in row.cells), escaped(row.meaning))
-            for row in page.archive
-        ]
-        parts.append(table(("type", *page.phases, "what it means"), rows))
-    facts = (("Domain", page.domain), ("Cost", page.cost), ("Hashes and versions", page.origin))
+    rows = [
+        (escaped(name), *(str(count or "") for count, _ in cells), escaped(meaning))
+        for name, meaning, cells in archive_rows(page.run)
+    ]
+    parts += [table(("type", *PHASES, "what it means"), rows)] if rows else []
+    facts = (
+        ("Domain", domain_rows(page.run)),
+        ("Cost", cost_rows(page.run)),
+        ("Hashes and versions", origin_rows(page.run)),
+    )
     return parts + [_folded(title, pairs) for title, pairs in facts if pairs]
 
 

@@ -18,8 +18,9 @@ import jinja2
 from markupsafe import Markup
 
 from pytest_garl.messages import printable
+from pytest_garl.reports.html import charts, run_page
 from pytest_garl.reports.html.kind_page import KindPage
-from pytest_garl.reports.html.naming import GENERATOR
+from pytest_garl.reports.html.naming import GENERATOR, shown_file
 from pytest_garl.reports.html.run_page import RunPage
 from pytest_garl.reports.run_comparison import RunComparison, change_text
 
@@ -30,7 +31,9 @@ _INDEX, _KIND, _COMPARISON = "index.html.jinja", "kind.html.jinja", "comparison.
 
 def render_index(page: RunPage) -> str:
     """Return the index of a report."""
-    return _render(_INDEX, page=page, scripts=())
+    return _render(
+        _INDEX, page=page, view=run_page, charts=charts, shown_file=shown_file, scripts=()
+    )
 
 
 def render_kind(page: KindPage) -> str:

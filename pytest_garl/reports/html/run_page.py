@@ -1,4 +1,4 @@
-"""The index of a report: the run in one look, as plain values."""
+"""The index of a report: the run in one look. Its template asks this module for texts and rows."""
 
 from __future__ import annotations
 
@@ -6,17 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pytest_garl.reports.causes import counted_causes
-from pytest_garl.reports.html.charts import (
-    Plot,
-    Segment,
-    kinds_over_flights,
-    outcome_bar,
-    violations_over_flights,
-)
 from pytest_garl.reports.html.kind_page import Fact, KindPage, KindPlan
-from pytest_garl.reports.html.naming import shown_file, still_address
+from pytest_garl.reports.html.naming import still_address
 from pytest_garl.reports.run_record import (
-    NO_PHASE,
     PHASES,
     KindRecord,
     RunRecord,
@@ -39,16 +31,6 @@ MOST_FINDINGS = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SearchCard:
-    """A search: how its flights ended, and its figures."""
-
-    search: SearchRecord
-    bar: tuple[Segment, ...]
-    violating: str
-    figures: tuple[Fact, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class KindRow:
     """A kind of violation in the index, with its page and the address of its picture's file.
 
@@ -65,37 +47,11 @@ class KindRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ArchiveRow:
-    """Flights of one type of violation by phase: (number, shade from 0 to 4)."""
-
-    type: str
-    meaning: str
-    cells: tuple[tuple[int, int], ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class RunPage:
-    """What the index says; ``problem`` says that a run is not finished."""
+    """What the index shows: a run, the rows of its kinds, and what is missing in the report."""
 
-    title: str
-    subtitle: str
-    problem: str
-    numbers: tuple[Fact, ...]
-    searches: tuple[SearchCard, ...]
+    run: RunRecord
     kinds: tuple[KindRow, ...]
-    not_by_chance: tuple[KindRow, ...]
-    compared: bool
-    """Whether random flights of any kind were counted beside the later ones."""
-    control: tuple[Fact, ...]
-    kinds_plot: Plot | None
-    violations_plot: Plot | None
-    phases: tuple[str, ...]
-    archive: tuple[ArchiveRow, ...]
-    findings: tuple[tuple[str, str, int, str], ...]
-    cost: tuple[Fact, ...]
-    domain: tuple[Fact, ...]
-    cases: tuple[tuple[str, str, str, str], ...]
-    origin: tuple[Fact, ...]
     notes: tuple[str, ...]
 
 
@@ -106,42 +62,11 @@ def run_page(
     # Over all searches, frequent ones first.
     shown = by_cause(sorted(shown, key=_order), lambda each: each[0].kind)
     kinds = tuple(_kind(plan, page, index) for index, (plan, page) in enumerate(shown))
-    return RunPage(
-        title=_title(run),
-        subtitle=_subtitle(run),
-        problem=_problem(run),
-        numbers=_numbers(run),
-        searches=tuple(search_card(search) for search in run.searches),
-        kinds=kinds,
-        not_by_chance=tuple(row for row in kinds if row.kind.in_control == 0),
-        compared=any(row.kind.in_control is not None for row in kinds),
-        control=tuple((each.name, text) for each in run.searches for text in kinds_lines(each)),
-        kinds_plot=kinds_over_flights(run.searches),
-        violations_plot=violations_over_flights(run.searches),
-        phases=(*PHASES, NO_PHASE),
-        archive=_archive(run),
-        findings=tuple(
-            (each.signature, search.name, each.count, each.headline)
-            for search in run.searches
-            for each in search.findings
-        )[:MOST_FINDINGS],
-        cost=cost_rows(run),
-        domain=domain_rows(run),
-        cases=tuple(
-            (
-                shown_file(each.path),
-                each.case.violation.signature,
-                each.case.status,
-                "yes" if each.known else "no",
-            )
-            for each in run.cases
-        ),
-        origin=_origin(run),
-        notes=tuple(missing),
-    )
+    return RunPage(run=run, kinds=kinds, notes=tuple(missing))
 
 
-def _title(run: RunRecord) -> str:
+def title(run: RunRecord) -> str:
+    """Return who was flown, and how many flights violate something in how many ways."""
     if not run.flown:
         return "No flights yet"
     names = list(dict.fromkeys(each.key.class_name for each in run.searches))
@@ -161,7 +86,8 @@ def _order(shown: tuple[KindPlan, KindPage]) -> tuple[int, str, str]:
     return -plan.kind.count, plan.kind.signature, page.where
 
 
-def _subtitle(run: RunRecord) -> str:
+def subtitle(run: RunRecord) -> str:
+    """Return when the run began, and what it was asked for."""
     day = f"{run.began[:16].replace('T', ' ')} UTC, " if run.began else ""
     options = run.options
     return (
@@ -170,7 +96,8 @@ def _subtitle(run: RunRecord) -> str:
     )
 
 
-def _problem(run: RunRecord) -> str:
+def problem(run: RunRecord) -> str:
+    """Return that a run is not finished; empty if it is."""
     if run.complete:
         return ""
     if run.flown < run.wanted:
@@ -184,7 +111,8 @@ def _problem(run: RunRecord) -> str:
     )
 
 
-def _numbers(run: RunRecord) -> tuple[Fact, ...]:
+def numbers(run: RunRecord) -> tuple[Fact, ...]:
+    """Return the figures at the top."""
     return (
         ("flights", str(run.flown)),
         ("landed", _share(run.landed, run.flown)),
@@ -199,11 +127,17 @@ def _share(count: int, total: int) -> str:
     return percent(count, total) if total else "–"
 
 
-def search_card(search: SearchRecord) -> SearchCard:
+def violating_text(search: SearchRecord) -> str:
+    """Return the share of flights that violate something, with its interval."""
+    low, high = search.violating_interval
+    share = percent(search.violating, search.flown)
+    return f"{share} violate something (95 %: {100 * low:.1f} to {100 * high:.1f} %)"
+
+
+def figures(search: SearchRecord) -> list[Fact]:
     """Return how the flights of a search ended."""
     total = search.flown
-    low, high = search.violating_interval
-    figures = [
+    found = [
         ("landed", _of(search.landed, total)),
         (PAPER_DEFINITION, _of(search.violating_by_the_paper, total)),
         ("gave up", counts_text(search.gave_up)),
@@ -213,22 +147,14 @@ def search_card(search: SearchRecord) -> SearchCard:
     ]
     distance_m, time_s = search.landing_distance_m, search.landing_time_s
     if distance_m and time_s:
-        figures += [
+        found += [
             (
                 "distance from the marker",
                 f"median {distance_m.median:.2f} m, worst {distance_m.worst:.2f} m",
             ),
             ("time to the touchdown", f"median {time_s.median:.1f} s, worst {time_s.worst:.1f} s"),
         ]
-    return SearchCard(
-        search=search,
-        bar=outcome_bar(search),
-        violating=(
-            f"{percent(search.violating, total)} violate something "
-            f"(95 %: {100 * low:.1f} to {100 * high:.1f} %)"
-        ),
-        figures=tuple(figure for figure in figures if figure[1]),
-    )
+    return [figure for figure in found if figure[1]]
 
 
 def _of(count: int, total: int) -> str:
@@ -296,28 +222,28 @@ def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
     )
 
 
-def _archive(run: RunRecord) -> tuple[ArchiveRow, ...]:
+def control_rows(run: RunRecord) -> list[Fact]:
+    """Return how diverse the kinds of each search are, and what random flights found beside it."""
+    return [(search.name, text) for search in run.searches for text in kinds_lines(search)]
+
+
+def archive_rows(run: RunRecord) -> list[tuple[str, str, list[tuple[int, int]]]]:
+    """Return type, meaning and, by phase, (number, shade from 0 to 4) of its flights."""
     counts = run.archive
     most = max((count for row in counts.values() for count in row.values()), default=1)
-    return tuple(
-        ArchiveRow(
-            type=name,
-            meaning=LEGEND[name],
-            cells=tuple(
-                (count := counts[name].get(phase, 0), _shade(count, most))
-                for phase in (*PHASES, NO_PHASE)
-            ),
-        )
-        for name in LEGEND
-        if name in counts
-    )
+    cells = {
+        name: [(row[phase], _shade(row[phase], most)) for phase in PHASES]
+        for name, row in counts.items()
+    }
+    return [(name, meaning, cells[name]) for name, meaning in LEGEND.items() if name in cells]
 
 
 def _shade(count: int, most: int) -> int:
     return 0 if not count else min(4, 1 + int(4 * count / (most + 1)))
 
 
-def _origin(run: RunRecord) -> tuple[Fact, ...]:
+def origin_rows(run: RunRecord) -> tuple[Fact, ...]:
+    """Return hash and versions, so that the index can be traced to what flew."""
     ledger = run.ledger
     return (
         ("results, SHA-256", run.results_sha256),
