@@ -170,10 +170,10 @@ class LedgerQueries:
         ]
 
     def scenarios(self, generation: int, slot: int, map: str) -> dict[str, str]:
-        """Return the scenario of a slot for each landing system."""
+        """Return the scenario of a slot in each search."""
         rows = self._database.execute(
-            "SELECT system, scenario FROM slot JOIN search ON search.id = slot.search "
-            "WHERE kind = 'search' AND map = ? AND generation = ? AND slot = ?",
+            "SELECT search.id, scenario FROM slot JOIN search ON search.id = slot.search "
+            "WHERE kind = 'search' AND map = ? AND generation = ? AND slot = ? ORDER BY search.id",
             (map, generation, slot),
         )
         return dict(rows.fetchall())

@@ -50,13 +50,26 @@ _STATES = ("waiting", "claimed", "flown")
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class StoredFlight:
+    """The scenario of a slot in a search, its landing system, and the name of the NPC policy."""
+
+    system: str
+    npcs: str
+    scenario: Scenario
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class StoredSlot:
-    """A slot of an earlier run: for each landing system the scenario and the NPC policy's name."""
+    """A slot of an earlier run, in each search that has it."""
 
     map: str
     slot: Slot
-    npcs: Mapping[str, str]
-    scenarios: Mapping[str, Scenario]
+    flights: Mapping[str, StoredFlight]
+
+    def flight(self, search: str, system: str) -> StoredFlight | None:
+        """Return the flight of a search; of a landing system if its search is another today."""
+        of_system = (each for each in self.flights.values() if each.system == system)
+        return self.flights.get(search) or next(of_system, None)
 
 
 def read_slot(path: Path, map: str, slot: Slot) -> StoredSlot:
@@ -69,13 +82,16 @@ def read_slot(path: Path, map: str, slot: Slot) -> StoredSlot:
         found = ledger.queries.scenarios(slot.generation, slot.index, map)
         if not found:
             raise LedgerError(f"no such slot in {path}; it holds {flown_slots(ledger)}")
-        jobs = [parse_job(job) for _, job in ledger.searches()]
-        return StoredSlot(
-            map=map,
-            slot=slot,
-            npcs={job.system.name: job.npcs.name for job in jobs if job.map == map},
-            scenarios={system: parse_scenario(text) for system, text in found.items()},
-        )
+        jobs = {search: parse_job(job) for search, job in ledger.searches()}
+        flights = {
+            search: StoredFlight(
+                system=jobs[search].system.name,
+                npcs=jobs[search].npcs.name,
+                scenario=parse_scenario(text),
+            )
+            for search, text in found.items()
+        }
+        return StoredSlot(map=map, slot=slot, flights=flights)
 
 
 @contextmanager

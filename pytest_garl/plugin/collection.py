@@ -164,6 +164,7 @@ def _repeated_targets(arguments: MarkerArguments, map: str, config: pytest.Confi
             return []
         return [replace(arguments.on(map), file=options.repeat)]
     stored = repeated_slot_of(config)
-    if stored is None or stored.map != map or arguments.target.system_name not in stored.scenarios:
+    if stored is None or stored.map != map:
         return []
-    return [replace(arguments.on(map), slot=stored.slot, stored=stored)]
+    target = replace(arguments.on(map), slot=stored.slot, stored=stored)
+    return [target] if target.stored_flight else []

@@ -106,8 +106,8 @@ class Searches:
 
     def policy_name(self, target: Target) -> str:
         """Return the policy of a target's NPCs, unless a fixture names one."""
-        options, earlier = self.options, target.stored
-        stored = earlier.npcs.get(target.system_name, "") if earlier else ""
+        options, earlier = self.options, target.stored_flight
+        stored = earlier.npcs if earlier else ""
         if not options.npcs and (stored in policy_names() or stored.endswith(".npz")):
             return stored
         return options.policy_in(target.domain or options.domain)
@@ -187,5 +187,5 @@ def _scenario_of(options: Options, target: Target) -> Scenario:
         return target.case.scenario
     if target.file:
         return load(Path(target.file), options.map_folders)
-    assert target.stored is not None
-    return target.stored.scenarios[target.system_name]
+    assert target.stored_flight is not None
+    return target.stored_flight.scenario

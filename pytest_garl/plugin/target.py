@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from pytest_garl.cases.case import Case
     from pytest_garl.cases.corpus import CorpusEntry
-    from pytest_garl.execution.stored_ledger import StoredSlot
+    from pytest_garl.execution.stored_ledger import StoredFlight, StoredSlot
     from pytest_garl.landing_system import Airframe, NavigationKind
     from pytest_garl.scenarios.domains.domain import Domain
     from pytest_garl.verdicts.verdict import Limits
@@ -94,6 +94,11 @@ class Target:
     def is_searched(self) -> bool:
         """Whether a search breeds the scenario; else a saved case or a file holds it."""
         return self.entry is None and not self.file
+
+    @property
+    def stored_flight(self) -> StoredFlight | None:
+        """The flight to repeat: that of the same search if the earlier run had it."""
+        return self.stored.flight(self.search, self.system_name) if self.stored else None
 
     @functools.cached_property
     def search(self) -> str:

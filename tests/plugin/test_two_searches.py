@@ -7,12 +7,12 @@ import re
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 from pytest_garl.cases.corpus import Corpus
-from pytest_garl.cli import main
 from pytest_garl.reports.run_reading import read_run
 from pytest_garl.reports.run_record import RunRecord
+from pytest_garl.scenarios.files import parse_scenario
+from tests.cli.test_report_command import garl
 from tests.support.landing_project import project, run
 
 TESTS = """
@@ -25,6 +25,14 @@ def test_collisions(landing):
 
 def test_own(landing):
     assert landing.elapsed_s < 14.0, "too slow in {name}"
+"""
+SEED = """
+import pytest
+from systems import Good
+
+@pytest.mark.garl(system=Good, maps=["lawn"], domain="{domain}")
+def test_seed(landing, scenario):
+    print("seed", scenario.seed)
 """
 CALM, PAPER = "Good on lawn (domain calm)", "Good on lawn (domain paper)"
 
@@ -67,8 +75,8 @@ def test_each_domain_has_a_table_of_its_own(
 def test_the_report_tells_searches_of_one_place_apart(pytester: pytest.Pytester) -> None:
     two_files(pytester, "domain='calm'", "domain='paper'")
     run(pytester, "--garl-budget=4", "--garl-workers=0")
-    runner, ledger = CliRunner(), ".garl/ledger.sqlite"
-    found = json.loads(runner.invoke(main, ["report", "--json"]).output)
+    ledger = ".garl/ledger.sqlite"
+    found = json.loads(garl(pytester.path, "report", "--json"))
     assert [(each["name"], each["domain"]) for each in found["searches"]] == [
         (CALM, "calm"),
         (PAPER, "paper"),
@@ -77,9 +85,8 @@ def test_the_report_tells_searches_of_one_place_apart(pytester: pytest.Pytester)
         "test_first.py::test_collisions",
         "test_first.py::test_own",
     ]
-    text = runner.invoke(main, ["report"]).output
-    assert f"{CALM}: 4 of 4 flown" in text
-    compared = runner.invoke(main, ["report", ledger, ledger]).output
+    assert f"{CALM}: 4 of 4 flown" in garl(pytester.path, "report")
+    compared = garl(pytester.path, "report", ledger, ledger)
     assert f"\n{CALM}\n" in compared
     assert f"\n{PAPER}\n" in compared
 
@@ -101,3 +108,19 @@ def test_files_that_share_the_flights_are_one_search(pytester: pytest.Pytester) 
     (one,) = record(pytester.path).searches
     assert (one.name, one.flown) == ("Good on lawn", 4)
     assert one.key.files == ("test_first.py", "test_second.py")
+
+
+def test_a_repeated_slot_has_the_scenario_of_its_own_search(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    files = {"test_it.py": "calm", "test_second.py": "paper"}
+    for file, domain in files.items():
+        (pytester.path / file).write_text(SEED.format(domain=domain))
+    run(pytester, "--garl-budget=2", "--garl-workers=0")
+    seeds = {
+        each.key.domain: parse_scenario(each.flight("lawn-g00-s01").scenario).seed
+        for each in record(pytester.path).searches
+    }
+    assert seeds["calm"] != seeds["paper"]
+    for file, domain in files.items():
+        told = run(pytester, "-rA", file, "--garl-repeat=lawn-g00-s01", "--garl-workers=0")
+        told.stdout.fnmatch_lines([f"seed {seeds[domain]}"])
