@@ -39,6 +39,7 @@ def with_bystander(scenario: Scenario) -> Scenario:
 
 
 @pytest.mark.sim
+@pytest.mark.long
 def test_case_of_a_collision_is_a_careless_crossing_alone_in_clear_weather(tmp_path: Path) -> None:
     flights = RealFlights(tmp_path)
     found = with_bystander(crossing(encounter("person-1", "person", 1.0)))
