@@ -20,7 +20,6 @@ from pytest_garl.reports.run_text import PAPER_DEFINITION, kinds_lines, percent
 
 if TYPE_CHECKING:
     from pytest_garl.reports.html.report import WrittenReport
-    from pytest_garl.reports.html.run_page import KindRow
 
 VARIABLE = "GITHUB_STEP_SUMMARY"
 """GitHub names in this variable the file whose text it shows on the page of the step."""
@@ -57,9 +56,11 @@ def write_step_summary(
     """
     if not os.environ.get(VARIABLE):
         return
-    url = run.options.report_url
-    shown = report.page.kinds if report else ()
-    pages = {(row.page.where, row.kind.signature): row for row in shown}
+    pages = {}
+    if report is not None:
+        for row in report.page.kinds:
+            link = page_link(row, report.index.parent, run.options.report_url)
+            pages[row.page.where, row.kind.signature] = link
     rows: list[Row] = [
         (
             escaped(search.name),
@@ -68,28 +69,27 @@ def write_step_summary(
             escaped("; ".join(filter(None, (kind.title, kind.headline)))),
             escaped(kind.least),
             code(repeat_kind_command(search, kind, reporter.config)),
-            _link(pages.get((search.name, kind.signature)), report, url),
+            pages.get((search.name, kind.signature), ""),
         )
         for search in record.searches
         for kind in search.kinds
     ]
     rows += _failed_cases(reporter)
-    searches = record.searches
-    parts = [table(SHARES, [_shares(search) for search in searches])] if searches else []
-    none = f"No violation{f' in {record.flown} flights' if record.flown else ''}."
+    shares = [_shares(search) for search in record.searches]
+    parts = [table(SHARES, shares)] if shares else []
     parts += [
-        escaped(f"{search.name}: {line}") for search in searches for line in kinds_lines(search)
+        escaped(f"{each.name}: {line}") for each in record.searches for line in kinds_lines(each)
     ]
-    parts.append(_kinds_table(rows) if rows else none)
+    flown = f" in {record.flown} flights" if record.flown else ""
+    parts.append(_kinds_table(rows) if rows else f"No violation{flown}.")
     parts += [*_failed_beside(reporter), *renewal_lines(reporter)]
-    parts += index_parts(report.page, report.index.parent, url) if report else ()
+    parts += index_parts(report.page, report.index.parent, run.options.report_url) if report else ()
     _append(reporter, parts)
 
 
 def write_lost_cases(reporter: Any) -> None:
     """Append the lost cases of a session that flew nothing, if GitHub names a file."""
-    lines = _failed_beside(reporter)
-    if lines:
+    if lines := _failed_beside(reporter):
         _append(reporter, lines)
 
 
@@ -97,10 +97,9 @@ def _append(reporter: Any, parts: Sequence[str]) -> None:
     path = os.environ.get(VARIABLE)
     if not path:
         return
-    text = "\n\n".join(parts)
     try:
         with Path(path).open("a", encoding="utf-8") as file:
-            file.write(f"## pytest-garl\n\n{text}\n\n")
+            file.write("\n\n".join(("## pytest-garl", *parts, "")))
     except OSError as error:
         reporter.write_line(f"garl: {VARIABLE}: {path}: cannot be written ({error})")
 
@@ -109,10 +108,6 @@ def _kinds_table(rows: Sequence[Row]) -> str:
     """Return the table of kinds; without links to pages it has no column for them."""
     columns = len(COLUMNS) - (not any(row[-1] for row in rows))
     return table(COLUMNS[:columns], [row[:columns] for row in rows])
-
-
-def _link(kind: KindRow | None, report: WrittenReport | None, url: str) -> str:
-    return page_link(kind, report.index.parent, url) if kind and report else ""
 
 
 def _flights(search: SearchRecord, kind: KindRecord) -> str:

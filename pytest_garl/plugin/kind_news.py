@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from pytest_garl.cases.case_request import CaseRequest, CaseResult
+from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import duration, wrapped, write_lines
@@ -64,7 +65,8 @@ class KindNews:
                 continue
             self._found.add((search, signature))
             flight = ledger.queries.first_of(search, signature)
-            where = f"{flight.system.split(':')[-1]} on {flight.id.map}"
+            key = SearchKey(system=flight.system, map=flight.id.map)
+            where = ledger.facts.search_names.get(search, key.place)
             what = headline(flight.result.verdict.story)
             yield f"garl: found {signature}: {what} ({where}, {flight.id.slot_id})"
 

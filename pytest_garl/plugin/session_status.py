@@ -129,9 +129,9 @@ def notes(tally: Tally) -> Iterator[str]:
     for search in tally.record.searches if tally.record else ():
         if not search.landed:
             yield f"{search.name}: landed in none of {counted(search.flown, 'flight')}"
-    for (system, map), slots in sorted(_unrepeated_by_search(tally).items()):
+    for name, slots in _unrepeated_by_search(tally).items():
         violations = counted(len(slots), "violation")
-        yield f"{_search(system, map)}: {violations} did not repeat: {listed(slots)}"
+        yield f"{name}: {violations} did not repeat: {listed(slots)}"
 
 
 def _flights_were_asked_for(tally: Tally, options: Options) -> bool:
@@ -187,25 +187,22 @@ def _without_landing(searches: Sequence[SearchRecord]) -> Iterator[str]:
 
 def _unrepeated(tally: Tally, searches: Sequence[SearchRecord]) -> Iterator[str]:
     """Yield which searches have too many violations that did not repeat."""
-    flown = {(search.key.system, search.key.map): search.flown for search in searches}
-    for (system, map), slots in _unrepeated_by_search(tally).items():
-        flights = flown.get((system, map), 0)
+    flown = {search.name: search.flown for search in searches}
+    for name, slots in _unrepeated_by_search(tally).items():
+        flights = flown.get(name, 0)
         allowed = max(1, flights // FLIGHTS_PER_EXCEPTION)
         if len(slots) > allowed:
             yield (
-                f"{_search(system, map)}: {len(slots)} violations in {flights} flights did not "
+                f"{name}: {len(slots)} violations in {flights} flights did not "
                 f"repeat, at most {allowed} may: {listed(slots)}"
             )
 
 
-def _unrepeated_by_search(tally: Tally) -> dict[tuple[str, str], list[str]]:
-    found: dict[tuple[str, str], set[str]] = {}
-    for each in tally.records:
+def _unrepeated_by_search(tally: Tally) -> dict[str, list[str]]:
+    """Return the slots of each search with violations that did not repeat, by its name."""
+    found: dict[str, set[str]] = {}
+    for each in sorted(tally.records, key=lambda each: (each.system, each.map)):
         if each.not_repeated:
-            slot = f"{each.slot} ({each.failure_signature})"
-            found.setdefault((each.system, each.map), set()).add(slot)
+            slots = found.setdefault(tally.search_name(each), set())
+            slots.add(f"{each.slot} ({each.failure_signature})")
     return {search: sorted(slots) for search, slots in found.items()}
-
-
-def _search(system: str, map: str) -> str:
-    return f"{system.split(':')[-1]} on {map}"

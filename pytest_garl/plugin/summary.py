@@ -16,7 +16,7 @@ from pytest_garl.plugin.header import cpu_dispatch_warning
 from pytest_garl.plugin.item_record import records
 from pytest_garl.plugin.landing import NOT_JUDGED
 from pytest_garl.plugin.options import Options
-from pytest_garl.plugin.run import Run
+from pytest_garl.plugin.run import Films, Run
 from pytest_garl.plugin.save_cases import saved_lines
 from pytest_garl.plugin.session_status import notes
 from pytest_garl.plugin.suggested_commands import repeat_kind_command, shown_path
@@ -42,8 +42,8 @@ def write_run(reporter: Any, run: Run, tally: Tally) -> None:
     record = tally.run_record(run)
     if record.searches:
         reporter.section("garl: violations", sep="=")
-    for line in _lines_about(record, run, tally, reporter):
-        reporter.write_line(line)
+        for line in _lines_about(record, run, tally, reporter):
+            reporter.write_line(line)
     lines = [
         *_excused_lines(tally, width_of(reporter.config)),
         *saved_lines(run.investigated, reporter.config),
@@ -75,19 +75,19 @@ def write_status(reporter: Any, tally: Tally) -> None:
 
 def _excused_lines(tally: Tally, width: int) -> list[str]:
     """Return a line for each kind that a known case excuses, with the file of the case."""
-    slots: dict[tuple[str, str, str, str], set[str]] = {}
+    slots: dict[tuple[str, ...], set[str]] = {}
     for each in tally.records:
         if each.excused_by:
-            kind = (each.system, each.map, each.failure_signature, each.excused_by)
+            place, ending = (each.system, each.map), each.failure_signature
+            kind = (*place, tally.search_name(each), ending, each.excused_by)
             slots.setdefault(kind, set()).add(each.slot or "")
     return [
         wrapped(
-            f"known: {system.split(':')[-1]} on {map}: {ending} in "
-            f"{counted(len(found), 'flight')}, excused by {file}",
+            f"known: {name}: {ending} in {counted(len(found), 'flight')}, excused by {file}",
             width,
             others="    ",
         )
-        for (system, map, ending, file), found in sorted(slots.items())
+        for (_, _, name, ending, file), found in sorted(slots.items())
     ]
 
 
@@ -123,18 +123,20 @@ def _cases_outside(reporter: Any) -> list[str]:
 
 
 def _lines_about(record: RunRecord, run: Run, tally: Tally, reporter: Any) -> list[str]:
-    if not record.searches:
-        return []
-    width = width_of(reporter.config)
+    width, films = width_of(reporter.config), run.films or Films()
     lines = [
         line
         for each in record.searches
-        for line in search_table(each, reporter.config, width, _films_of(run, each))
+        for line in search_table(each, reporter.config, width, films.of_search(each.name))
     ]
     types = legend((*record.kinds, *(finding for _, finding in record.findings)))
     lines += [wrapped(text, width) for text in (types, _costs(record, run.options)) if text]
     lines += _not_finished(record, run, tally)
-    worlds = dict.fromkeys(_world(search) for search in record.searches if search.key.domain)
+    worlds = dict.fromkeys(
+        f"domain {search.key.domain}, NPCs {' and '.join(search.npcs)}"
+        for search in record.searches
+        if search.key.domain
+    )
     lines += [wrapped(world, width, others="  ") for world in worlds]
     return [*lines, f"ledger: {record.ledger}  results {record.results_sha256[:16]}"]
 
@@ -149,11 +151,6 @@ def _not_finished(record: RunRecord, run: Run, tally: Tally) -> list[str]:
     if tally.interrupted and run.investigations is not None:
         return [f"not finished: all {record.wanted} flown, but no case is saved; {goes_on}"]
     return []
-
-
-def _world(search: SearchRecord) -> str:
-    """Return the conditions of a search: its domain, and who moved the NPCs."""
-    return f"domain {search.key.domain}, NPCs {' and '.join(search.npcs)}"
 
 
 def fold_skips(reporter: Any) -> None:
@@ -187,10 +184,6 @@ def _costs(record: RunRecord, options: Options) -> str:
     if costs.idle_share is not None:
         words.append(f"workers idle {100 * costs.idle_share:.0f} %")
     return ", ".join(words)
-
-
-def _films_of(run: Run, search: SearchRecord) -> Mapping[str, Path]:
-    return run.films.of_search(search.name) if run.films else {}
 
 
 def search_table(

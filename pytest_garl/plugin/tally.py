@@ -132,6 +132,13 @@ class Tally:
             )
         return self.record
 
+    def search_name(self, item: ItemRecord) -> str:
+        """Return what texts call the search of an item's flight."""
+        from pytest_garl.execution.facts import SearchKey
+
+        place = SearchKey(system=item.system, map=item.map).place
+        return self.record.names.get(item.search, place) if self.record else place
+
     @property
     def unasserted(self) -> Counter[str]:
         """How many flights violate without failing any selected test, by signature."""

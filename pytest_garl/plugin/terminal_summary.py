@@ -55,14 +55,19 @@ def _write_run(reporter: Any, run: Run, tally: Tally) -> None:
         from pytest_garl.plugin.summary import write_run
 
         write_run(reporter, run, tally)
+    # Without a record the line above says why: nothing more is known of the searches.
+    record = tally.record
     with _one_line_if_broken(reporter, "the pages"):
         from pytest_garl.plugin.pages import write_pages
 
-        report = write_pages(reporter, run, tally.run_record(run))
+        report = write_pages(reporter, run, record) if record else None
     with _one_line_if_broken(reporter, "the step summary"):
-        from pytest_garl.plugin.github_summary import write_step_summary
+        from pytest_garl.plugin.github_summary import write_lost_cases, write_step_summary
 
-        write_step_summary(reporter, run, tally.run_record(run), report)
+        if record:
+            write_step_summary(reporter, run, record, report)
+        else:
+            write_lost_cases(reporter)
 
 
 @contextlib.contextmanager

@@ -79,6 +79,7 @@ def record_of(
             idle_s=meters.get("idle_s", 0.0),
         ),
         searches=tuple(each.with_cases(cases, investigated) for each in searches),
+        names=facts.search_names,
         cases=cases,
         jobs=jobs,
     )

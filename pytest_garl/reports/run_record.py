@@ -406,6 +406,8 @@ class RunRecord:
     flown: int
     costs: RunCosts
     searches: tuple[SearchRecord, ...]
+    names: Mapping[str, str]
+    """What texts call each search, by its key in the ledger."""
     cases: tuple[SavedCase, ...]
     """Those of the landing systems that have flights of searches."""
     jobs: Mapping[str, FlightJob]

@@ -57,6 +57,7 @@ def test_each_domain_has_a_table_of_its_own(
     two_files(pytester, "domain='calm'", "domain='paper'")
     told = run(pytester, "--garl-budget=8", "--garl-workers=0", "--garl-report=pages")
     told.stdout.fnmatch_lines([f"{CALM}: 8 flown, *", f"{PAPER}: 8 flown, *"])
+    assert f"({PAPER}, lawn-g00-" in " ".join(told.stdout.str().split()), "news of a kind"
     repeats = re.findall(r"  pytest (.*) --garl-repeat", told.stdout.str())
     assert {*repeats} == {"test_first.py", "test_second.py"}
     calm, paper = record(pytester.path).searches
