@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, Protocol
+from typing import IO, Protocol
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import LedgerError, PoolError
@@ -26,6 +26,7 @@ from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.processes import (
     Heartbeat,
+    WorkerReport,
     create_report_file,
     descendants_of,
     read_report,
@@ -114,7 +115,7 @@ class _Worker:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
 
-    def report(self) -> dict[str, Any]:
+    def report(self) -> WorkerReport | None:
         """Return the last report of the process, or of its supervisor."""
         return read_report(self.report_file)
 
@@ -209,20 +210,18 @@ class ProcessPool:
     def _handle_exit(self, pid: int, worker: _Worker, stands_still: str = "") -> None:
         """Decide what follows from the end of a worker, which may have been ended as it hung."""
         try:
-            facts, status = worker.report(), worker.process.wait()
-            if "cannot_go_on" in facts:
+            found, status = worker.report(), worker.process.wait()
+            report = found or WorkerReport()
+            if report.cannot_go_on:
                 self._queue.release(pid)
-                raise PoolError(facts["cannot_go_on"].strip())
-            failure = facts.get("failure")
+                raise PoolError(report.cannot_go_on.strip())
             ended = WorkerExit(
-                status=facts.get("status", status),
-                stacks=facts.get("stacks", ""),
-                stderr=facts.get("stderr") or worker.last_stderr(),
-                hung=stands_still or facts.get("hung", ""),
-                failure=(failure["error"], failure["message"], failure["traceback"])
-                if failure
-                else None,
-                watched=bool(facts),
+                status=status if report.status is None else report.status,
+                stacks=report.stacks,
+                stderr=report.stderr or worker.last_stderr(),
+                hung=stands_still or report.hung,
+                failure=report.failure,
+                watched=found is not None,
             )
             if not self._kind.handle_exit(self._queue, pid, ended):
                 self._count_idle_exit(ended)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import dataclasses
 import json
 import os
 import signal
@@ -82,6 +83,56 @@ def _stat(pid: int) -> list[str]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WorkerReport:
+    """What a worker process, or its supervisor, tells the process that started it.
+
+    ``status`` is the exit status of the flying process, negative for a signal.  ``hung`` says what
+    took too long, ``stacks`` are the stacks of that moment, ``stderr`` is the end of its stderr.
+    ``failure`` is type, message and traceback of an error that may be the flight's own, and
+    ``cannot_go_on`` an error that would occur in any other worker as well.
+    """
+
+    status: int | None = None
+    hung: str = ""
+    stacks: str = ""
+    stderr: str = ""
+    failure: tuple[str, str, str] | None = None
+    cannot_go_on: str = ""
+
+    def dumps(self, room: int | None = None) -> bytes:
+        """Return it as JSON; of texts that do not fit into ``room`` bytes both ends are kept."""
+        report, characters = self, room or 0
+        while len(text := json.dumps(dataclasses.asdict(report)).encode()) > (room or len(text)):
+            characters //= 2
+            report = self._shortened(characters)
+        return text
+
+    def _shortened(self, characters: int) -> WorkerReport:
+        def ends(text: str) -> str:
+            half = characters // 2
+            return text if len(text) <= characters else f"{text[:half]}\n...\n{text[-half:]}"
+
+        kind, message, text = self.failure or ("", "", "")
+        return dataclasses.replace(
+            self,
+            stacks=ends(self.stacks),
+            stderr=ends(self.stderr),
+            failure=(ends(kind), ends(message), ends(text)) if self.failure else None,
+            cannot_go_on=ends(self.cannot_go_on),
+        )
+
+    @classmethod
+    def loads(cls, text: bytes) -> WorkerReport | None:
+        """Return the report that JSON holds, or None if there is none."""
+        found: dict[str, Any] = json.loads(text) if text else {}
+        known = {
+            each.name: found[each.name] for each in dataclasses.fields(cls) if each.name in found
+        }
+        failure = known.get("failure")
+        return cls(**{**known, "failure": tuple(failure) if failure else None}) if known else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Parent:
     """The process that started this one, and the file for this one's last report to it.
 
@@ -106,10 +157,10 @@ class Parent:
         """Show the parent that this process goes on: the file's time of change is later."""
         os.utime(self.file)
 
-    def report(self, **facts: Any) -> None:
+    def report(self, report: WorkerReport) -> None:
         """Write a report; it replaces an earlier one."""
         os.ftruncate(self.file, 0)
-        os.pwrite(self.file, json.dumps(facts).encode(), 0)
+        os.pwrite(self.file, report.dumps(), 0)
 
 
 def create_report_file() -> int:
@@ -117,11 +168,9 @@ def create_report_file() -> int:
     return os.memfd_create("garl-report")
 
 
-def read_report(file: int) -> dict[str, Any]:
-    """Return the report of a child process that has ended; empty if it was killed."""
-    text = os.pread(file, os.fstat(file).st_size, 0)
-    facts: dict[str, Any] = json.loads(text) if text else {}
-    return facts
+def read_report(file: int) -> WorkerReport | None:
+    """Return the report of a child process that has ended; None if it was killed."""
+    return WorkerReport.loads(os.pread(file, os.fstat(file).st_size, 0))
 
 
 class Heartbeat:
@@ -178,7 +227,7 @@ def run_worker(main: Callable[..., None], component: str) -> None:
     try:
         main(parent, *sys.argv[3:])
     except Exception as error:  # noqa: BLE001 (the pool raises it)
-        parent.report(cannot_go_on=failure_text(error, component))
+        parent.report(WorkerReport(cannot_go_on=failure_text(error, component)))
         sys.exit(1)
 
 

@@ -10,6 +10,7 @@ leaves behind.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import faulthandler
 import json
 import mmap
@@ -28,6 +29,7 @@ from typing import Any, NoReturn
 
 from pytest_garl.execution.processes import (
     Parent,
+    WorkerReport,
     adopt_orphans,
     alive,
     children_of,
@@ -64,9 +66,9 @@ _MEMORY_BYTES = 2**16
 _WAITS, _GOES_ON, _ENDS = 1.0, 0.0, 2.0
 """What is known of a request: it waits for an answer, or the flying process goes on or ends."""
 
-JudgeFunction = Callable[[dict[str, Any], Callable[[], None]], dict[str, Any]]
-"""Takes a request of the flying process, and what ends that process, and judges; returns the facts
-with which that process must end, or none if it may go on."""
+JudgeFunction = Callable[[dict[str, Any], Callable[[], None]], WorkerReport | None]
+"""Takes a request of the flying process, and what ends that process, and judges; returns the report
+with which that process must end, or None if it may go on."""
 
 
 class FlightMonitor:
@@ -107,7 +109,7 @@ class FlightMonitor:
 
     def request(self, **facts: Any) -> bool:
         """Have the supervisor judge a flight; return whether this process may fly another one."""
-        self.report(**facts)
+        self._write(json.dumps(facts).encode())
         self._numbers[_ASKED] = _WAITS
         # The supervisor waits for output; if there is no stderr any more, it looks a bit later.
         with contextlib.suppress(OSError):
@@ -118,7 +120,10 @@ class FlightMonitor:
 
     def requested(self) -> dict[str, Any] | None:
         """Return the request that waits for an answer, or None."""
-        return self.reported() if self._numbers[_ASKED] == _WAITS else None
+        if self._numbers[_ASKED] != _WAITS:
+            return None
+        facts: dict[str, Any] = json.loads(self._text())
+        return facts
 
     def answer(self, *, goes_on: bool) -> None:
         """Let the flying process go on, or end."""
@@ -141,21 +146,20 @@ class FlightMonitor:
         """Note that the flying process is being ended, so that it records nothing more."""
         self._numbers[_ENDING] = 1.0
 
-    def report(self, **facts: Any) -> None:
-        """Leave a message to the supervisor; long values are shortened to the room there is."""
-        room = _MEMORY_BYTES - _TEXT
-        text = json.dumps(facts).encode()
-        if len(text) > room:
-            short = {key: str(value)[-room // 8 :] for key, value in facts.items()}
-            text = json.dumps(short).encode()
+    def report(self, report: WorkerReport) -> None:
+        """Leave a report to the supervisor; long texts are shortened to the room there is."""
+        self._write(report.dumps(_MEMORY_BYTES - _TEXT))
+
+    def reported(self) -> WorkerReport | None:
+        """Return the report, or None if there is none."""
+        return WorkerReport.loads(self._text())
+
+    def _write(self, text: bytes) -> None:
         self._memory[_TEXT : _TEXT + len(text)] = text
         self._numbers[_LENGTH] = len(text)
 
-    def reported(self) -> dict[str, Any]:
-        """Return the message; empty if there is none."""
-        length = int(self._numbers[_LENGTH])
-        facts: dict[str, Any] = json.loads(self._memory[_TEXT : _TEXT + length]) if length else {}
-        return facts
+    def _text(self) -> bytes:
+        return self._memory[_TEXT : _TEXT + int(self._numbers[_LENGTH])]
 
 
 def supervise(
@@ -208,7 +212,7 @@ def _fly(
             os.write(_STDERR, error.code.encode())
         status = error.code if isinstance(error.code, int) else int(error.code is not None)
     except Exception as error:  # noqa: BLE001 (the pool raises it)
-        monitor.report(cannot_go_on=failure_text(error, component))
+        monitor.report(WorkerReport(cannot_go_on=failure_text(error, component)))
     except BaseException:  # noqa: BLE001 (such as a landing system's own KeyboardInterrupt)
         traceback.print_exc(file=sys.stderr)
     finally:
@@ -231,7 +235,7 @@ class _Supervisor:
     ) -> None:
         self._parent, self._monitor, self._flying = parent, monitor, flying
         self._stderr, self._judge = stderr, judge
-        self._judged: dict[str, Any] = {}
+        self._judged: WorkerReport | None = None
         self._poll = select.poll()
         self._poll.register(stderr, select.POLLIN)
         self._is_open = True
@@ -249,12 +253,15 @@ class _Supervisor:
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
             self._read_stderr(0)
             end_descendants()
+            said = self._judged or self._monitor.reported() or WorkerReport()
             self._parent.report(
-                status=status,
-                hung=self._hung,
-                stacks=self._stacks.decode(errors="replace"),
-                stderr=self._text.decode(errors="replace"),
-                **(self._judged or self._monitor.reported()),
+                dataclasses.replace(
+                    said,
+                    status=status,
+                    hung=self._hung,
+                    stacks=self._stacks.decode(errors="replace"),
+                    stderr=self._text.decode(errors="replace"),
+                )
             )
         except _EndRequestedError:
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
@@ -291,7 +298,8 @@ class _Supervisor:
         try:
             self._judged = self._judge(request, self._end_flying)
         except Exception as error:  # noqa: BLE001 (the pool raises it)
-            self._judged = {"cannot_go_on": failure_text(error, "the judge of flights")}
+            text = failure_text(error, "the judge of flights")
+            self._judged = WorkerReport(cannot_go_on=text)
         if self._judged:
             self._end_flying()
         self._monitor.answer(goes_on=not (left or self._judged))

@@ -24,7 +24,7 @@ from pytest_garl.execution.checkout import isolate_imports
 from pytest_garl.execution.fly_and_judge import FlownJob, judge_record
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
-from pytest_garl.execution.processes import Parent, failure_text, run_worker
+from pytest_garl.execution.processes import Parent, WorkerReport, failure_text, run_worker
 from pytest_garl.execution.supervisor import FlightMonitor, supervise
 from pytest_garl.execution.worker_failure import call_limit_s
 from pytest_garl.foreign_text import (
@@ -72,8 +72,8 @@ class SlotJudge:
         self._ledger, self._worker = ledger, worker
         self._queue: WorkQueue | None = None
 
-    def judge(self, request: dict[str, Any], end_flying: Callable[[], None]) -> dict[str, Any]:
-        """Judge a flight; return the facts with which the worker must end, or none.
+    def judge(self, request: dict[str, Any], end_flying: Callable[[], None]) -> WorkerReport | None:
+        """Judge a flight; return the report with which the worker must end, or None.
 
         ``end_flying`` ends the flying process: called if the ledger is locked, since a thread that
         the flight has left may hold the lock.
@@ -88,32 +88,30 @@ class SlotJudge:
             claim = self._queue.claim_of(self._worker)
             if claim is None:
                 # The slot was given back: whoever claims it now flies it again.
-                return {}
+                return None
             job, scenario = parse_job(claim.job), parse_scenario(claim.scenario)
             try:
                 judged = judge_record(job, scenario, claim.flight, FlownJob(**request))
             except Exception as error:  # noqa: BLE001 (a record may hold anything)
-                return _unproven(error) if proves else {"failure": failure_of(error)}
+                return _unproven(error) if proves else _failure(error)
             if not proves:
                 self._queue.record(claim, *judged)
                 self._queue.count("idle_s", idle_s)
         except LedgerError as error:
-            return {"cannot_go_on": str(error)}
-        return {}
+            return WorkerReport(cannot_go_on=str(error))
+        return None
 
 
-def _unproven(error: Exception) -> dict[str, Any]:
-    return {"cannot_go_on": str(SimulatorError(failure_text(error, SIMULATOR)))}
+def _unproven(error: Exception) -> WorkerReport:
+    return WorkerReport(cannot_go_on=str(SimulatorError(failure_text(error, SIMULATOR))))
 
 
-def failure_of(error: Exception) -> dict[str, str]:
-    """Return type, message and traceback of an error, whatever its own code does."""
+def _failure(error: Exception) -> WorkerReport:
+    """Report type, message and traceback of an error, whatever its own code does."""
     kind = class_name(type(error))
-    return {
-        "error": kind,
-        "message": text_from(lambda: str(error), MESSAGE_CHARS, f"{kind}, whose str()"),
-        "traceback": text_from(lambda: _text(error), TRACEBACK_CHARS, f"{kind}, whose traceback"),
-    }
+    message = text_from(lambda: str(error), MESSAGE_CHARS, f"{kind}, whose str()")
+    text = text_from(lambda: _text(error), TRACEBACK_CHARS, f"{kind}, whose traceback")
+    return WorkerReport(failure=(kind, message, text))
 
 
 def _text(error: Exception) -> str:
@@ -167,7 +165,7 @@ class Worker:
             except Exception as error:
                 if _is_permanent(error) and not state.limited():
                     raise
-                self._monitor.report(failure=failure_of(error))
+                self._monitor.report(_failure(error))
                 break
             goes_on = self._monitor.request(**dataclasses.asdict(flown), idle_s=self._idle_s)
             if not goes_on or state.changed():

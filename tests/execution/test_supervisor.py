@@ -170,6 +170,15 @@ def test_an_error_of_what_judges_ends_the_run(field: Field) -> None:
         field.fly(Good, simulator=has_a_hash_that_no_file_takes)
 
 
+def raises_at_length(*args: Any, **more: Any) -> Any:
+    raise ValueError("ж" * 30_000)
+
+
+def test_simulator_that_fails_with_a_long_text_ends_the_run_with_it(field: Field) -> None:
+    with pytest.raises(PoolError, match="ValueError: жжж"):
+        field.fly(Good, simulator=raises_at_length)
+
+
 def test_limit_of_a_call_ignores_the_simulators_time(field: Field) -> None:
     flown = field.fly(Good, timeout_s=2.0, simulator=works_between_calls)
     assert flown.result.outcome == "landed"

@@ -22,7 +22,12 @@ from typing import Any
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.ledger_queue import WorkQueue
-from pytest_garl.execution.processes import Parent, any_command_contains, run_worker
+from pytest_garl.execution.processes import (
+    Parent,
+    WorkerReport,
+    any_command_contains,
+    run_worker,
+)
 from pytest_garl.execution.ray.actor import ActorWorkspace
 from pytest_garl.execution.ray.scheduler import RayScheduler
 
@@ -143,7 +148,7 @@ def unreachable(address: str, reason: str) -> str:
 def _give_up(address: str) -> None:
     """End the process from a thread: the call of Ray does not return."""
     reason = unreachable(address, f"no cluster after {CONNECT_S:g} s")
-    Parent.of_this_process().report(cannot_go_on=reason)
+    Parent.of_this_process().report(WorkerReport(cannot_go_on=reason))
     os._exit(1)
 
 

@@ -164,9 +164,9 @@ def test_driver_ends_if_no_connection_is_made() -> None:
     command = [sys.executable, "-c", code, str(os.getpid()), str(report)]
     done = subprocess.run(command, check=False, timeout=50, pass_fds=[report])
     assert done.returncode == 1
-    assert read_report(report)["cannot_go_on"].startswith(
-        "RAY_ADDRESS=head:6379: no cluster after 0.1 s"
-    )
+    found = read_report(report)
+    assert found is not None
+    assert found.cannot_go_on.startswith("RAY_ADDRESS=head:6379: no cluster after 0.1 s")
     os.close(report)
 
 
