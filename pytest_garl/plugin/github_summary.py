@@ -152,9 +152,8 @@ def _failed_cases(reporter: Any) -> list[Row]:
         if slot.startswith("case-"):
             headline, _, see_it = _message(report).partition("\n")
             command = see_it.partition(": ")[2]
-            signature = record.signature or ""
-            texts = (escaped(text) for text in (slot, signature, "1", headline, record.severity))
-            rows.append((*texts, code(command), ""))
+            texts = (slot, record.signature or "", "1", headline, record.severity)
+            rows.append((*map(escaped, texts), code(command), ""))
     return rows
 
 
