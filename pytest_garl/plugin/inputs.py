@@ -34,8 +34,7 @@ def repeated_slot_of(config: pytest.Config) -> StoredSlot | None:
     if _SLOT not in config.stash:
         slot = Slot(generation=int(match["generation"]), index=int(match["slot"]))
         try:
-            found = read_slot(options.folder / "ledger.sqlite", match["map"], slot)
+            config.stash[_SLOT] = read_slot(options.folder / "ledger.sqlite", match["map"], slot)
         except GarlError as error:
             raise pytest.UsageError(f"--garl-repeat={options.repeat}: {error}") from error
-        config.stash[_SLOT] = found
     return config.stash[_SLOT]
