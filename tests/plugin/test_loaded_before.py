@@ -94,7 +94,7 @@ def test_environment_does_not_change_what_a_search_breeds(
 
 
 def test_other_sessions_keep_their_instructions(unpinned: pytest.Pytester) -> None:
-    unpinned.runpytest_subprocess("-p", "no:cacheprovider")
+    unpinned.runpytest_subprocess("-p", "no:cacheprovider", "-o", "garl_workers=1")
     assert (unpinned.path / "in_pytest.txt").read_text().endswith("-nehalem")
 
 
