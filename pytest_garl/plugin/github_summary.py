@@ -87,10 +87,11 @@ def write_step_summary(
     _append(reporter, parts)
 
 
-def write_lost_cases(reporter: Any) -> None:
-    """Append the lost cases of a session that flew nothing, if GitHub names a file."""
-    if lines := _failed_beside(reporter):
-        _append(reporter, lines)
+def write_failures_alone(reporter: Any) -> None:
+    """Append what failed in a session without a record of its searches, if GitHub names a file."""
+    rows = _failed_cases(reporter)
+    if parts := [*([_kinds_table(rows)] if rows else []), *_failed_beside(reporter)]:
+        _append(reporter, parts)
 
 
 def _append(reporter: Any, parts: Sequence[str]) -> None:

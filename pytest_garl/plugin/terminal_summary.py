@@ -25,9 +25,9 @@ def write_summary(reporter: Any, config: pytest.Config, tally: Tally) -> None:
         _write_run(reporter, run, tally)
     else:
         with _one_line_if_broken(reporter, "the step summary"):
-            from pytest_garl.plugin.github_summary import write_lost_cases
+            from pytest_garl.plugin.github_summary import write_failures_alone
 
-            write_lost_cases(reporter)
+            write_failures_alone(reporter)
     if tally.items or tally.problems:
         with _one_line_if_broken(reporter, "the summary"):
             from pytest_garl.plugin.summary import write_status
@@ -62,12 +62,12 @@ def _write_run(reporter: Any, run: Run, tally: Tally) -> None:
 
         report = write_pages(reporter, run, record) if record else None
     with _one_line_if_broken(reporter, "the step summary"):
-        from pytest_garl.plugin.github_summary import write_lost_cases, write_step_summary
+        from pytest_garl.plugin.github_summary import write_failures_alone, write_step_summary
 
         if record:
             write_step_summary(reporter, run, record, report)
         else:
-            write_lost_cases(reporter)
+            write_failures_alone(reporter)
 
 
 @contextlib.contextmanager

@@ -160,6 +160,32 @@ def test_fixed_case_must_pass_with_its_moves_and_with_a_live_policy(
     run(searched).assert_outcomes(passed=8, xfailed=1)
 
 
+LOSES_ITS_LEDGER = """
+
+import pathlib
+import sqlite3
+import pytest
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionfinish(session):
+    with sqlite3.connect(pathlib.Path(session.config.rootpath, ".garl", "ledger.sqlite")) as db:
+        db.execute("DROP TABLE slot")
+"""
+
+
+def test_step_summary_names_failed_cases_though_the_ledger_is_lost(
+    searched: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = searched.path / "summary.md"
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
+    replace_text(cases(searched)[1], 'status = "open"', 'status = "fixed"')
+    conftest = searched.path / "conftest.py"
+    conftest.write_text(conftest.read_text() + LOSES_ITS_LEDGER)
+    result = run(searched, *SEARCH)
+    assert result.ret == pytest.ExitCode.INTERNAL_ERROR
+    assert "| case-lawn-IV-dog-" in page.read_text()
+
+
 @pytest.mark.parametrize("reason", ["sensor-limited", "unpreventable"])
 def test_case_that_was_not_preventable_excuses_itself_alone(
     searched: pytest.Pytester, reason: str
