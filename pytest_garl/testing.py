@@ -27,7 +27,7 @@ from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.files.json_values import dataclass_from
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import divergence_time_s
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.foreign_text import shown
 from pytest_garl.landing_system import (
     Mission,
@@ -488,7 +488,7 @@ def _place(flight: Flight, time_s: float) -> str:
     beside_m = math.dist((x, y), flight.marker_position_m)
     phase = Evidence(flight).phase_at(time_s)
     return (
-        f"at {time_s:.1f} s, in the phase {phase}, {up_m(z):.1f} m up and "
+        f"at {time_s:.1f} s, in the phase {phase}, {feet_height_m(z):.1f} m up and "
         f"{beside_m:.1f} m from the marker"
     )
 

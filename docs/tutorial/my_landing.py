@@ -53,17 +53,17 @@ class MyLandingSystem:
         self.look(observation)
         if self.target is None:
             return PositionSetpoint(position_m=(*self.mission.gps_position_m, top))
-        told = Diagnostics(target_m=(*self.target, 0.0))
+        diagnostics = Diagnostics(target_m=(*self.target, 0.0))
         if observation.time_s - self.seen_s > LOST_S and z > 1.5:
-            return PositionSetpoint(position_m=(*self.target, top), diagnostics=told)
+            return PositionSetpoint(position_m=(*self.target, top), diagnostics=diagnostics)
         if z < 0.3:
-            return Land(diagnostics=told)
+            return Land(diagnostics=diagnostics)
         off = math.dist((x, y), self.target)
         sink = 0.8 if off < 0.3 + 0.2 * z else 0.0
         vx, vy = (
             max(-2.0, min(2.0, aim - at)) for aim, at in zip(self.target, (x, y), strict=True)
         )
-        return VelocitySetpoint(velocity_mps=(vx, vy, -sink), diagnostics=told)
+        return VelocitySetpoint(velocity_mps=(vx, vy, -sink), diagnostics=diagnostics)
 
     def look(self, observation: Observation) -> None:
         """Where the marker's centre is, if it is in the picture: the UAV hovers nearly level."""

@@ -10,7 +10,7 @@ import numpy as np
 from pytest_garl.cases.story_text import story_in_words
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.flight.flight import Flight, ObjectRecord
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placed import Placed, PlacedNpc
@@ -66,7 +66,7 @@ def _approach(flight: Flight, hit: ObjectRecord, severity: Severity) -> str:
     outside = np.flatnonzero(distance > NEAR_M)
     entered = int(outside[-1]) + 1 if len(outside) else 0
     entered = min(entered, len(distance) - 1)
-    up = up_m(float(uav[entered, 2]))
+    up = feet_height_m(float(uav[entered, 2]))
     speeds = np.hypot(hit.track.velocity_mps[:, 0], hit.track.velocity_mps[:, 1])
     speed = float(speeds[entered:].max())
     kind = " ".join(word for word in (severity.grade, hit.type) if word)

@@ -15,7 +15,7 @@ import numpy as np
 from pytest_garl.cases.clearance import Clearance, ObjectPose
 from pytest_garl.flight.flight import Flight, Track
 from pytest_garl.flight.landing_phases import LandingPhases
-from pytest_garl.flight.thresholds import GRAVITY_MPS2, up_m
+from pytest_garl.flight.thresholds import GRAVITY_MPS2, feet_height_m
 from pytest_garl.landing_system import Airframe, VelocitySetpoint
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.maps.map import Map
@@ -113,7 +113,7 @@ class EscapeModel:
         scenario: Scenario,
         phases: LandingPhases,
     ) -> None:
-        phases.update(tick / PHYSICS_RATE_HZ, up_m(motion.position_m[2]))
+        phases.update(tick / PHYSICS_RATE_HZ, feet_height_m(motion.position_m[2]))
         if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
             situations = [
                 self._situation(npc.state, npcs, tick, motion, scenario, phases) for npc in npcs
@@ -174,7 +174,7 @@ class EscapeModel:
         self._place(npcs, self._index)
         for npc, item in zip(npcs, chase.flight.objects, strict=True):
             speeds = np.hypot(*item.track.velocity_mps[: self._index, :2].T)
-            npc.has_run(speeds.tolist(), TICKS_PER_SAMPLE * TICK_S)
+            npc.spend_reserve(speeds.tolist(), TICKS_PER_SAMPLE * TICK_S)
         return npcs
 
     def _take_in(self, npcs: Sequence[Npc], index: int) -> None:
@@ -182,7 +182,9 @@ class EscapeModel:
         track = self._chase.flight.uav
         known = self._known_samples
         for each in range(known, index + 1):
-            self._phases.update(float(track.time_s[each]), up_m(float(track.position_m[each, 2])))
+            self._phases.update(
+                float(track.time_s[each]), feet_height_m(float(track.position_m[each, 2]))
+            )
         self._known_samples = max(known, index + 1)
         for npc in npcs:
             uav_m = _vector(track.position_m[index])

@@ -41,20 +41,20 @@ class MyLandingSystem:
             detections = (Detection(marker_id=marker, confidence=1.0, position_m=seen),)
         x, y, z = (float(value) for value in observation.position_m)
         # Verdicts do not read this, but reports do: they can say what your system saw.
-        told = Diagnostics(detections=detections, target_m=self.target)
+        diagnostics = Diagnostics(detections=detections, target_m=self.target)
         if self.target is None:
             if observation.time_s > GIVE_UP_S:
-                return Abort(diagnostics=told)
+                return Abort(diagnostics=diagnostics)
             # A setpoint starts the motors and takes off.
             look_from = (*self.mission.gps_position_m, self.mission.search_altitude_m)
-            return PositionSetpoint(position_m=look_from, diagnostics=told)
+            return PositionSetpoint(position_m=look_from, diagnostics=diagnostics)
         tx, ty, _ = self.target
         off = math.dist((x, y), (tx, ty))
         if z < 0.5 and off < 0.3:
-            return Land(diagnostics=told)
+            return Land(diagnostics=diagnostics)
         # Come down inside a cone above the marker, so that the camera keeps it in view.
         lower = max(0.3, z - 1.0) if off < 0.2 + 0.15 * z else z
-        return PositionSetpoint(position_m=(tx, ty, lower), speed_mps=1.5, diagnostics=told)
+        return PositionSetpoint(position_m=(tx, ty, lower), speed_mps=1.5, diagnostics=diagnostics)
 
     def look(self, observation: Observation) -> tuple[float, float, float] | None:
         """Return where the marker lies in the world, if it is in the image."""

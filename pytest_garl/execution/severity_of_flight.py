@@ -7,7 +7,7 @@ import numpy as np
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.flight.flight import Contact, Flight, ObjectRecord
 from pytest_garl.flight.landing_phases import LandingPhases
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.npcs.grades import GRADE_LIMITS
 from pytest_garl.scenarios.conditions import active_conditions, unread_groups
 from pytest_garl.scenarios.maps.map import Map
@@ -104,5 +104,5 @@ def _phases_s(flight: Flight) -> tuple[float, ...]:
     """Return when the phases of the landing began, from the UAV's track."""
     phases = LandingPhases()
     for time_s, height_m in zip(flight.uav.time_s, flight.uav.position_m[:, 2], strict=True):
-        phases.update(float(time_s), up_m(float(height_m)))
+        phases.update(float(time_s), feet_height_m(float(height_m)))
     return phases.began_s

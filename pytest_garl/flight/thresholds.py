@@ -14,6 +14,6 @@ HARD_TOUCHDOWN_MPS = 2.0
 """Contact speed of a drop from 0.2 m: the least drop height of EASA CS 27.725."""
 
 
-def up_m(body_m: float) -> float:
+def feet_height_m(body_m: float) -> float:
     """Return how high the feet are above the ground, for a body's height; never below it."""
     return max(0.0, body_m - BODY_ABOVE_FEET_M)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pytest_garl.flight.flight import Flight
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.bodies import discs_of
 from pytest_garl.scenarios.chromosome import decode
@@ -330,7 +330,7 @@ def _wind(clear: Scenario, domain: Domain) -> _Made:
 
 
 def _top_m(twin: Flight) -> float:
-    return up_m(float(twin.uav.position_m[:, 2].max()))
+    return feet_height_m(float(twin.uav.position_m[:, 2].max()))
 
 
 def _half_way(twin: Flight) -> tuple[float, float] | None:
@@ -358,5 +358,5 @@ def _half_height(twin: Flight) -> tuple[float, float]:
     """
     half = _top_m(twin) / 2
     above = np.nonzero(twin.uav.position_m[:, 2] > half)[0]
-    height = up_m(float(twin.uav.position_m[above[-1], 2]))
+    height = feet_height_m(float(twin.uav.position_m[above[-1], 2]))
     return round(float(twin.uav.time_s[above[-1]]), 2), height

@@ -9,7 +9,7 @@ from typing import Any
 
 from pytest_garl.flight.flight import Crash, Flight, Outcome
 from pytest_garl.flight.landing_phases import LandingPhases
-from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, GRAVITY_MPS2, up_m
+from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, GRAVITY_MPS2, feet_height_m
 from pytest_garl.landing_system import Abort, Command, Land, VehicleState, VelocitySetpoint
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.placed import Placed
@@ -157,7 +157,7 @@ class Loop:
         if not math.isfinite(sum(position) + sum(attitude) + sum(velocity) + sum(spin)):
             raise self._system.not_finite_error(now)
         if tick % TICKS_PER_NPC_STEP == 0:
-            self.phases.update(now, up_m(position[2]))
+            self.phases.update(now, feet_height_m(position[2]))
             self._move_npcs(tick, position)
         if tick % TICKS_PER_TRACK_SAMPLE == 0:
             self._contacts.record_pose(now)
@@ -166,18 +166,18 @@ class Loop:
                 return "gave_up"
         x, y, z, w = attitude
         motion = Motion(position, velocity, attitude, rotate((-x, -y, -z, w), spin))
-        told = self._navigation.estimate(tick, motion)
-        self._observe(tick, motion, told)
+        estimate = self._navigation.estimate(tick, motion)
+        self._observe(tick, motion, estimate)
         while self._pending and self._pending[0][0] <= tick:
             self._take(self._pending.pop(0)[1])
-        self._actuate(tick, motion, told)
+        self._actuate(tick, motion, estimate)
         thrust_n = sum(self._thrusts)
         return self._contacts.outcome(now, position, attitude, velocity, thrust_n)
 
-    def _actuate(self, tick: int, motion: Motion, told: Motion) -> None:
+    def _actuate(self, tick: int, motion: Motion, estimate: Motion) -> None:
         """Apply the thrusts and the drag of this tick, and step the physics."""
         model, attitude = self._model, motion.attitude
-        self._thrusts = lag(self._thrusts, self._thrusts_wanted(tick, told), model, TICK_S)
+        self._thrusts = lag(self._thrusts, self._thrusts_wanted(tick, estimate), model, TICK_S)
         total, torque = wrench(self._thrusts, model)
         fx, fy, fz = rotate(attitude, (0.0, 0.0, total))
         vx, vy, vz = motion.velocity_mps
@@ -185,16 +185,16 @@ class Loop:
         dx, dy, dz = drag((vx - ax, vy - ay, vz - az), model)
         self._world.step(motion.position_m, (fx + dx, fy + dy, fz + dz), rotate(attitude, torque))
 
-    def _thrusts_wanted(self, tick: int, told: Motion) -> Thrusts:
+    def _thrusts_wanted(self, tick: int, estimate: Motion) -> Thrusts:
         """Return the wanted thrusts of the system's own flight control, or of the simulated one."""
         if self._contacts.motors_stopped:
             return NO_THRUST
         flies_motors = self._system.airframe.control_rate_hz and self._system.has_stepped
         if not flies_motors or isinstance(self._command, Abort):
             on_ground_s = self._contacts.on_ground_s(tick / PHYSICS_RATE_HZ)
-            return self._control.thrusts(told, self._command, TICK_S, on_ground_s)
+            return self._control.thrusts(estimate, self._command, TICK_S, on_ground_s)
         if tick % self._ticks_per_control == 0:
-            state = _vehicle_state(tick, told, self._thrusts)
+            state = _vehicle_state(tick, estimate, self._thrusts)
             self._wanted_thrusts = self._system.control(state, self._model.max_thrust_n)
         return self._wanted_thrusts
 
@@ -251,20 +251,20 @@ class Loop:
         position, attitude, _, _ = self._world.uav_state()
         return eye_under(position, attitude), attitude
 
-    def _observe(self, tick: int, motion: Motion, told: Motion) -> None:
+    def _observe(self, tick: int, motion: Motion, estimate: Motion) -> None:
         """Show the landing system what has arrived, and queue its commands for their latency."""
         if self._system.gave_up:
             if self._sensors.takes_picture(tick):
                 # The recorded view explains a collision during the climb.
                 self.recorder.step(Abort(), self._sensors.look(tick, motion)[1])
             return
-        for delivery in self._sensors.deliveries(tick, motion, told):
+        for delivery in self._sensors.deliveries(tick, motion, estimate):
             if not self._system.gave_up:
                 self._step(tick, delivery)
 
     def _step(self, tick: int, delivery: Delivery) -> None:
-        if self._system.told:
-            self._system.told.observe_truth(self._truth(self._navigation.error_m))
+        if self._system.truth_pilot:
+            self._system.truth_pilot.observe_truth(self._truth(self._navigation.error_m))
         command = self._system.step(delivery.observation)
         error_m = estimation_error_m(delivery.observation, delivery.place_m)
         self.recorder.step(command, delivery.sight, error_m, delivery.range_m)

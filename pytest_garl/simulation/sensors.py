@@ -114,19 +114,19 @@ class Sensors:
             self._last_look = frame, sight
         return frame, sight
 
-    def deliveries(self, tick: int, motion: Motion, told: Motion) -> Iterator[Delivery]:
+    def deliveries(self, tick: int, motion: Motion, estimate: Motion) -> Iterator[Delivery]:
         """Yield what reaches the landing system at this step of the physics, in order.
 
-        ``motion`` is the true one, ``told`` what the UAV's navigation says of it.
+        ``motion`` is the true one, ``estimate`` what the UAV's navigation says of it.
         """
         late = self._timing.stamp_ticks
         if late < 0:
-            self._poses.append(told)
+            self._poses.append(estimate)
         if self.takes_picture(tick) and tick + late >= 0:
             self._take(tick, motion)
         if self._pictures and self._pictures[0].tick + max(0, late) <= tick:
             picture = self._pictures.popleft()
-            self._send(tick, picture, self._poses[0] if late < 0 else told)
+            self._send(tick, picture, self._poses[0] if late < 0 else estimate)
         while self._under_way and self._under_way[0][0] <= tick:
             yield self._under_way.popleft()[1]
 

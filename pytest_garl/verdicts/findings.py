@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.verdicts.evidence import AT_MARKER_M, Evidence
 from pytest_garl.verdicts.verdict import Finding
 from pytest_garl.verdicts.wording import compass_point
@@ -53,7 +53,7 @@ def descent_elsewhere(evidence: Evidence) -> Finding | None:
     if -float(moved[2]) < LEAST_SINK_M:
         return None
     # The straight line of the last seconds, down to the ground.
-    left = up_m(float(places[-1, 2])) / -float(moved[2])
+    left = feet_height_m(float(places[-1, 2])) / -float(moved[2])
     aim = places[-1, :2] + left * moved[:2]
     marker = flight.marker_position_m
     off_m = min(math.dist(place, marker) for place in (tuple(places[-1, :2]), tuple(aim)))

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from pytest_garl.flight.flight import Flight
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.verdicts.ending import with_cause
 from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.excuses import excuse
@@ -141,4 +141,4 @@ def _where(flight: Flight) -> str:
         hidden = (
             f" In the last 2 s {100 * share:.0f} % of the marker was hidden or out of the frame."
         )
-    return f"At {flight.elapsed_s:.1f} s the UAV was {up_m(z):.1f} m up, {place}.{hidden}"
+    return f"At {flight.elapsed_s:.1f} s the UAV was {feet_height_m(z):.1f} m up, {place}.{hidden}"

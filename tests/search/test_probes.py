@@ -11,7 +11,7 @@ import pytest
 
 from pytest_garl import Camera, Start
 from pytest_garl.flight.flight import Flight, Track
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.domains.domain import Domain
@@ -98,7 +98,7 @@ def test_until_its_event_a_probe_is_the_twin() -> None:
 def test_the_height_at_which_the_marker_goes_is_that_of_the_feet() -> None:
     probe = probes()["marker-gone"]
     index = int(twin().uav.time_s.searchsorted(probe.scenario["cover.from_s"], side="right")) - 1
-    height_m = up_m(float(twin().uav.position_m[index, 2]))
+    height_m = feet_height_m(float(twin().uav.position_m[index, 2]))
     assert f"{height_m:.1f} m up" in probe.sentence
 
 

@@ -20,7 +20,7 @@ from pytest_garl.simulation.system_under_test.descent import (
     centring_velocity,
     descend,
 )
-from pytest_garl.simulation.system_under_test.ground_truth import ToldPilot, Truth, TruthObject
+from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthObject, TruthPilot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +71,7 @@ class AvoidanceParameters:
         )
 
 
-class StraightPilot(ToldPilot):
+class StraightPilot(TruthPilot):
     """The paper's UAV.
 
     It "flies directly to the marker without any additional trajectory planning".

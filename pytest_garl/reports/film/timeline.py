@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.flight.flight import Flight, Step
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.reports.film import drawing
 from pytest_garl.reports.film.pose import Poses
 
@@ -28,7 +28,9 @@ class Timeline:
     def __init__(self, flight: Flight, signature: str) -> None:
         self._flight, self._signature = flight, signature or "no violation"
         self._times = flight.uav.time_s
-        self._heights = np.array([up_m(height) for height in flight.uav.position_m[:, 2].tolist()])
+        self._heights = np.array(
+            [feet_height_m(height) for height in flight.uav.position_m[:, 2].tolist()]
+        )
         self._longest = max(float(flight.elapsed_s), 1.0)
         self._highest = max(float(self._heights.max()), 1.0)
         self._background = drawing.blank_picture(WIDTH, HEIGHT)
@@ -37,7 +39,7 @@ class Timeline:
     def draw(self, poses: Poses, step: Step | None, *, ended: bool = False) -> drawing.Image:
         """Return the timeline at one moment; an ``ended`` flight shows its outcome."""
         picture = self._background.copy()
-        height = up_m(float(poses.position_m[2]))
+        height = feet_height_m(float(poses.position_m[2]))
         past = self._times < poses.time_s
         line = self._pixels(self._times[past], self._heights[past])
         present = self._pixels(np.array([poses.time_s]), np.array([height]))

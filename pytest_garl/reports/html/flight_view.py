@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.flight.flight import Flight, ObjectRecord, Step, Track
-from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, up_m
+from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, feet_height_m
 from pytest_garl.messages import shortened
 from pytest_garl.reports.html.moments import Moment, telling_moment
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
@@ -113,7 +113,7 @@ def _metres(evidence: Evidence, picked: NDArray[np.intp]) -> list[dict[str, Any]
     x, y, z = flight.uav.position_m[picked].T
     mx, my = flight.marker_position_m
     lines = [
-        _line("height above the ground", "height", [up_m(float(each)) for each in z]),
+        _line("height above the ground", "height", [feet_height_m(float(each)) for each in z]),
         _line("UAV to the marker's centre", "marker", np.hypot(x - mx, y - my)),
     ]
     if flight.objects:

@@ -14,7 +14,7 @@ import numpy as np
 
 from pytest_garl.cases.case import NOT_ASKED, Prevention
 from pytest_garl.flight.flight import Flight
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.reports.html.sightings_text import readable_and_reported
 from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.verdict import Verdict
@@ -235,7 +235,7 @@ def _path_at_marker(evidence: Evidence) -> str:
     track, end_s = evidence.flight.uav, evidence.decided_s
     marker = evidence.flight.marker_position_m
     away = np.hypot(track.position_m[:, 0] - marker[0], track.position_m[:, 1] - marker[1])
-    heights = np.array([up_m(float(z)) for z in track.position_m[:, 2]])
+    heights = np.array([feet_height_m(float(z)) for z in track.position_m[:, 2]])
     counted = (track.time_s <= end_s) & (heights >= FLYING_M)
     if not counted.any():
         return "The UAV did not leave the ground."

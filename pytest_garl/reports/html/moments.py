@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pytest_garl.flight.flight import Flight, Step
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.verdicts.detectability import readable_probability
 from pytest_garl.verdicts.evidence import LOW_M, Evidence
 from pytest_garl.verdicts.margins import COMMIT_M
@@ -97,7 +97,7 @@ def last_far(flight: Flight, moments: Sequence[Moment]) -> Moment | None:
     """Return the last moment at which the UAV is not close to the ground; without one the last."""
     heights = flight.uav.position_m[:, 2]
     for moment in reversed(moments):
-        if up_m(float(np.interp(moment.time_s, flight.uav.time_s, heights))) >= CLOSE_M:
+        if feet_height_m(float(np.interp(moment.time_s, flight.uav.time_s, heights))) >= CLOSE_M:
             return moment
     return moments[-1] if moments else None
 
@@ -163,7 +163,7 @@ def _longest_gap(readable: list[float], end_s: float) -> float | None:
 
 def _descends_below(flight: Flight, height_m: float, end_s: float) -> float | None:
     """Return when the feet last came below a height, after the UAV had been high."""
-    heights = np.array([up_m(float(z)) for z in flight.uav.position_m[:, 2]])
+    heights = np.array([feet_height_m(float(z)) for z in flight.uav.position_m[:, 2]])
     times = flight.uav.time_s
     high = np.flatnonzero((heights >= height_m) & (times <= end_s))
     if not len(high) or heights[: high[-1] + 1].max() < min(LOW_M, heights.max()):

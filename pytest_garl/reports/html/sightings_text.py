@@ -9,7 +9,7 @@ import numpy as np
 from pytest_garl.cases.case import OBSERVED_WITHIN_S
 from pytest_garl.cases.observability import OBSERVABLE_PX, pixels_of
 from pytest_garl.flight.flight import Step
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.messages import shortened
 from pytest_garl.reports.html.flight_view import gap_m, phases
 from pytest_garl.verdicts.evidence import Evidence
@@ -71,7 +71,7 @@ def _body(evidence: Evidence, steps: Sequence[Step]) -> Iterator[str]:
         return
     frames = f"{len(seen)} frame{'s' if len(seen) > 1 else ''}"
     index = min(int(np.searchsorted(flight.uav.time_s, seen[0])), len(flight.uav.time_s) - 1)
-    up = up_m(float(flight.uav.position_m[index, 2]))
+    up = feet_height_m(float(flight.uav.position_m[index, 2]))
     yield (
         f"The camera showed {body} in {frames}, first at {seen[0]:.1f} s, which is "
         f"{contact.time_s - seen[0]:.1f} s before the contact: the UAV was {up:.1f} m up, and the "

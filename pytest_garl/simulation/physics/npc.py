@@ -219,7 +219,7 @@ class Npc:
         self.vx_mps, self.vy_mps = velocity_mps
         self.yaw_rad = yaw_rad
 
-    def has_run(self, speeds_mps: Sequence[float], dt_s: float) -> None:
+    def spend_reserve(self, speeds_mps: Sequence[float], dt_s: float) -> None:
         """Take in the speeds at which it ran before it was placed."""
         for speed in speeds_mps:
             self._reserve_m = reserve_after(self.type, self._reserve_m, speed, dt_s)

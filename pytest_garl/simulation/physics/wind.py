@@ -71,8 +71,8 @@ class Turbulence:
 
     along_mps: float
     up_mps: float
-    along_m: float
-    up_m: float
+    along_length_m: float
+    up_length_m: float
 
 
 def low_altitude_turbulence(mean_mps: float, height_m: float) -> Turbulence:
@@ -88,8 +88,8 @@ def low_altitude_turbulence(mean_mps: float, height_m: float) -> Turbulence:
     return Turbulence(
         along_mps=up_mps / term**0.4,
         up_mps=up_mps,
-        along_m=height_ft / term**1.2 * _M_PER_FT,
-        up_m=height_ft * _M_PER_FT,
+        along_length_m=height_ft / term**1.2 * _M_PER_FT,
+        up_length_m=height_ft * _M_PER_FT,
     )
 
 
@@ -169,8 +169,8 @@ class Wind:
         turbulence = low_altitude_turbulence(self._mean_mps, height_m)
         passed_m = max(LEAST_AIRSPEED_MPS, airspeed_mps) * GUST_STEP_S
         level = self._intensity * turbulence.along_mps
-        along = level * self._along.step(passed_m / turbulence.along_m)
-        across = level * self._across.step(passed_m / turbulence.along_m)
-        up = self._intensity * turbulence.up_mps * self._up.step(passed_m / turbulence.up_m)
+        along = level * self._along.step(passed_m / turbulence.along_length_m)
+        across = level * self._across.step(passed_m / turbulence.along_length_m)
+        up = self._intensity * turbulence.up_mps * self._up.step(passed_m / turbulence.up_length_m)
         x, y = along * self._cos - across * self._sin, along * self._sin + across * self._cos
         return x, y, up

@@ -36,7 +36,7 @@ class Truth:
     map: Map
 
 
-class ToldPilot:
+class TruthPilot:
     """Base of the pilots of this package that are told the truth before each step."""
 
     def observe_truth(self, truth: Truth) -> None:
@@ -50,16 +50,16 @@ class PilotWrapper:
     wrapped: Any
 
 
-def told_pilot(system: Any) -> ToldPilot | None:
+def truth_pilot_of(system: Any) -> TruthPilot | None:
     """Return the pilot that is told the truth, of a system or of what it wraps; None if none is."""
     # By the type: a landing system may have a property ``__class__``.
     kind = type(system)
-    if not issubclass(kind, ToldPilot | PilotWrapper) or not is_own(kind):
+    if not issubclass(kind, TruthPilot | PilotWrapper) or not is_own(kind):
         return None
-    told: ToldPilot | None = (
-        told_pilot(system.wrapped) if issubclass(kind, PilotWrapper) else system
+    pilot: TruthPilot | None = (
+        truth_pilot_of(system.wrapped) if issubclass(kind, PilotWrapper) else system
     )
-    return told
+    return pilot
 
 
 def is_own(system: type) -> bool:

@@ -17,7 +17,7 @@ from pytest_garl.landing_system import (
     VelocitySetpoint,
 )
 from pytest_garl.simulation.system_under_test.descent import centring_velocity, descend
-from pytest_garl.simulation.system_under_test.ground_truth import ToldPilot, Truth
+from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthPilot
 
 CRUISE_M = 10.0
 CRUISE_MPS = 4.0
@@ -33,7 +33,7 @@ object on the marker keeps any UAV from landing, but makes none collide."""
 ABORT_TAKES_S = 10.0
 
 
-class ReferencePilot(ToldPilot):
+class ReferencePilot(TruthPilot):
     """Flies above everything to the true marker and descends while its column stays clear."""
 
     airframe = Airframe(latency_s=0.0)

@@ -21,7 +21,7 @@ from pytest_garl.simulation.system_under_test.calls import (
     read_airframe,
 )
 from pytest_garl.simulation.system_under_test.diagnostics import DiagnosticsQuota
-from pytest_garl.simulation.system_under_test.ground_truth import ToldPilot, told_pilot
+from pytest_garl.simulation.system_under_test.ground_truth import TruthPilot, truth_pilot_of
 from pytest_garl.simulation.system_under_test.validation import read_command, read_thrusts
 
 
@@ -29,9 +29,9 @@ class SystemUnderTest:
     """The landing system of one flight.
 
     Every call may raise SystemFailedError, which ends the flight.
-    ``needs_camera`` and ``told``, a pilot of this package that is told the truth, are known after
-    ``start``.  ``has_stepped`` is whether ``step`` has returned a command, ``gave_up`` whether the
-    last one was ``Abort()``.
+    ``needs_camera`` and ``truth_pilot``, a pilot of this package that is told the truth, are known
+    after ``start``.  ``has_stepped`` is whether ``step`` has returned a command, ``gave_up`` whether
+    the last one was ``Abort()``.
     """
 
     def __init__(self, make_system: Callable[[], Any], guard: StepGuard | None) -> None:
@@ -40,7 +40,7 @@ class SystemUnderTest:
         self._quota = DiagnosticsQuota()
         self.airframe, self._airframe_error = self._read_airframe()
         self.needs_camera = True
-        self.told: ToldPilot | None = None
+        self.truth_pilot: TruthPilot | None = None
         self.has_stepped = self.gave_up = False
         self._system: Any = None
 
@@ -60,7 +60,7 @@ class SystemUnderTest:
         self.needs_camera = self._calls.run(
             "needs_camera", lambda: bool(getattr(self._system, "needs_camera", True))
         )
-        self.told = told_pilot(self._system)
+        self.truth_pilot = truth_pilot_of(self._system)
 
     def step(self, observation: Observation) -> Command:
         """Return the checked command for one camera frame."""

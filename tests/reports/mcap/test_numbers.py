@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from pytest_garl.flight.thresholds import up_m
+from pytest_garl.flight.thresholds import feet_height_m
 from tests.reports.mcap.conftest import Exported
 from tests.support.mcap_files import decoded, needs_extra
 
@@ -33,7 +33,7 @@ def test_states_are_those_of_the_record(exported: Exported) -> None:
     for index, time_s in enumerate(track.time_s):
         state = recording.at("/state", round(time_s * 1e9))
         x, y, z = track.position_m[index]
-        assert max(0.0, state.height_m) == pytest.approx(up_m(z))
+        assert max(0.0, state.height_m) == pytest.approx(feet_height_m(z))
         assert state.to_marker_m == pytest.approx(math.dist((x, y), flight.marker_position_m))
         assert state.up_mps == track.velocity_mps[index, 2]
         margins = recording.at("/margins", round(time_s * 1e9))

@@ -58,8 +58,8 @@ def test_turbulence_is_that_of_the_standard() -> None:
     found = low_altitude_turbulence(10.0, 20 * 0.3048)
     assert found.up_mps == pytest.approx(1.0)
     assert found.along_mps == pytest.approx(1 / 0.19346**0.4)
-    assert found.up_m == pytest.approx(6.096)
-    assert found.along_m == pytest.approx(6.096 / 0.19346**1.2)
+    assert found.up_length_m == pytest.approx(6.096)
+    assert found.along_length_m == pytest.approx(6.096 / 0.19346**1.2)
 
 
 def test_scales_are_held_below_three_metres() -> None:
@@ -78,7 +78,7 @@ def test_gusts_have_the_standard_deviation_of_the_standard() -> None:
 def test_vertical_gusts_have_drydens_autocorrelation() -> None:
     # The Fourier pair of (1 + 3 (T w)^2) / (1 + (T w)^2)^2 is (1 - t / 2T) exp(-t / T).
     up = gusts(6.0, 60_000)[:, 2]
-    time_constant_s = low_altitude_turbulence(MEAN_MPS, 6.0).up_m / MEAN_MPS
+    time_constant_s = low_altitude_turbulence(MEAN_MPS, 6.0).up_length_m / MEAN_MPS
     for over_t in (0.5, 1.0, 2.0):
         lag = round(over_t * time_constant_s / GUST_STEP_S)
         found = float(np.mean(up[:-lag] * up[lag:]) / np.mean(up * up))

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.landing_system import Observation, PositionSetpoint
-from pytest_garl.simulation.system_under_test.ground_truth import Truth, told_pilot
+from pytest_garl.simulation.system_under_test.ground_truth import Truth, truth_pilot_of
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.support.answers import flight_of
 from tests.support.flights import Scripted
@@ -45,11 +45,11 @@ class AnswersToEveryName:
 @pytest.mark.parametrize("system", [Asks, Inherits, AnswersToEveryName])
 def test_landing_system_is_told_nothing(system: type) -> None:
     TOLD.clear()
-    assert told_pilot(system()) is None
+    assert truth_pilot_of(system()) is None
     flight_of(system)
     assert TOLD == []
 
 
 def test_pilots_of_the_package_are_told() -> None:
     pilot = ReferencePilot()
-    assert told_pilot(pilot) is pilot
+    assert truth_pilot_of(pilot) is pilot

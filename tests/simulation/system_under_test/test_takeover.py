@@ -18,7 +18,7 @@ from pytest_garl.landing_system import (
 )
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.system_under_test.ground_truth import told_pilot
+from pytest_garl.simulation.system_under_test.ground_truth import truth_pilot_of
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from pytest_garl.simulation.system_under_test.takeover import (
     Leg,
@@ -130,6 +130,6 @@ def test_pilot_takes_over_a_system_with_its_own_flight_control() -> None:
 def test_attributes_of_the_landing_system_are_seen_through() -> None:
     system = with_takeover(ReferencePilot, takeover("hold"))()
     assert system.needs_camera is False
-    assert isinstance(told_pilot(system), ReferencePilot)
+    assert isinstance(truth_pilot_of(system), ReferencePilot)
     assert with_takeover(ReferencePilot, takeover("hold")).needs_camera is False  # type: ignore[attr-defined]
-    assert told_pilot(with_takeover(BlindLander, takeover("hold"))()) is None
+    assert truth_pilot_of(with_takeover(BlindLander, takeover("hold"))()) is None
