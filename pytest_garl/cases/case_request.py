@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from pytest_garl.cases.case import Case, RecordedBehaviour
-from pytest_garl.cases.simplification import Complexity, complexity, genome_of
+from pytest_garl.cases.simplification import Complexity, complexity, genome_of_scenario
 from pytest_garl.cases.user_failure import UserAssertion
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
@@ -88,7 +88,7 @@ class CaseRequest:
     ) -> tuple[tuple[float, ...], Complexity]:
         severity = found[scenario].result.severity if self.asks_prevention else None
         key = () if severity is None else severity.key
-        return key, complexity(scenario, genome_of(scenario, self.map))
+        return key, complexity(scenario, genome_of_scenario(scenario, self.map))
 
     def fails(self, scenario: Scenario, flight: CompletedFlight) -> bool:
         """Return whether a flight fails with this request's signature."""

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.cases.case_header import CaseHeader
-from pytest_garl.cases.collected_tests import Collection
+from pytest_garl.cases.collected_tests import CollectedProject
 from pytest_garl.cases.corpus import Corpus, CorpusEntry, committed_cases, folder_of
 from pytest_garl.execution.sources import module_file
 from pytest_garl.files.bounded_files import MEGABYTE
@@ -38,7 +38,7 @@ class Lost:
     reason: str
 
 
-def census(corpus: Corpus, collection: Collection) -> list[Lost]:
+def census(corpus: Corpus, collection: CollectedProject) -> list[Lost]:
     """Return what is lost of a corpus, in the order of the paths."""
     found = list(_misplaced(corpus)) or list(_missing_corpus(corpus))
     if corpus.folder.is_dir():
@@ -105,7 +105,9 @@ def _holds_a_case(path: Path) -> bool:
     return all(sign in content for sign in _SIGNS_OF_A_CASE)
 
 
-def _why_lost(entry: CorpusEntry, corpus: Corpus, collection: Collection, project: _Project) -> str:
+def _why_lost(
+    entry: CorpusEntry, corpus: Corpus, collection: CollectedProject, project: _Project
+) -> str:
     """Return why nothing flies a case; empty if something does, or if another session may."""
     header, folder = entry.header, entry.path.parent
     if header is None:
@@ -126,10 +128,10 @@ def _why_lost(entry: CorpusEntry, corpus: Corpus, collection: Collection, projec
         # The items of these tests fail for it.
         return ""
     file = header.test.partition("::")[0] if "::" in header.test else ""
-    if file and file not in collection.files and (collection.root / file).is_file():
+    if file and file not in collection.test_files and (collection.root / file).is_file():
         return ""
     reason = _reason(header, file, collection)
-    known = file in collection.files or bool(collection.tests_of(header.system))
+    known = file in collection.test_files or bool(collection.tests_of(header.system))
     may_fly = project.may_fly(header.system, missing=reason.missing, known=known)
     return "" if may_fly else reason.text
 
@@ -142,7 +144,7 @@ class _Reason:
     missing: bool = False
 
 
-def _reason(header: CaseHeader, file: str, collection: Collection) -> _Reason:
+def _reason(header: CaseHeader, file: str, collection: CollectedProject) -> _Reason:
     system = header.system
     problem = system_problem(system, collection.root)
     if problem:
@@ -226,7 +228,7 @@ def _defines(file: Path, name: str) -> bool:
 class _Project:
     """The test files of the project that a session left out, looked for only if a case needs it."""
 
-    collection: Collection
+    collection: CollectedProject
 
     @functools.cached_property
     def left_out(self) -> tuple[Path, ...]:
@@ -264,7 +266,7 @@ class ProjectFiles:
     modules: frozenset[str]
 
 
-def project_files(collection: Collection) -> ProjectFiles:
+def project_files(collection: CollectedProject) -> ProjectFiles:
     """Look through the Python files of a project."""
     uncollected: list[Path] = []
     modules: set[str] = set()
@@ -275,7 +277,7 @@ def project_files(collection: Collection) -> ProjectFiles:
         is_test = _matches(name, collection.file_patterns)
         if not is_test:
             helper = helper or has_marker(path)
-        elif name not in collection.files:
+        elif name not in collection.test_files:
             uncollected.append(path)
     # A module or a conftest.py that holds the marker may give it to any test.
     left_out = [path for path in uncollected if has_marker(path) or (helper and _may_land(path))]
@@ -284,9 +286,9 @@ def project_files(collection: Collection) -> ProjectFiles:
 
 def marked_test_files(root: Path, patterns: Sequence[str], skipped: Sequence[str]) -> list[str]:
     """Return all test files of a project that may hold landing tests, as in node ids."""
-    nothing = Collection(
+    nothing = CollectedProject(
         root=root,
-        files=frozenset(),
+        test_files=frozenset(),
         tests=(),
         file_patterns=tuple(patterns),
         skipped_folders=tuple(skipped),

@@ -14,27 +14,27 @@ if TYPE_CHECKING:
 class CollectedTest:
     """A test that carries the marker: node id, landing system, all maps of the marker, data files.
 
-    ``name`` is that of the function.  ``files`` are the data files of the landing system.
+    ``name`` is that of the function.  ``data_files`` are the data files of the landing system.
     """
 
     nodeid: str
     name: str
     system: str
     maps: tuple[str, ...]
-    files: tuple[str, ...] = ()
+    data_files: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Collection:
+class CollectedProject:
     """What a session collected, before any test was deselected.
 
-    ``files`` are the test files that were collected whole, as in node ids.  ``file_patterns`` and
+    ``test_files`` are the files that were collected whole, as in node ids.  ``file_patterns`` and
     ``skipped_folders`` say which files of the project hold tests, as pytest's ini keys
     ``python_files`` and ``norecursedirs``.
     """
 
     root: Path
-    files: frozenset[str]
+    test_files: frozenset[str]
     tests: tuple[CollectedTest, ...]
     file_patterns: tuple[str, ...] = ("test_*.py", "*_test.py")
     skipped_folders: tuple[str, ...] = ()

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from pytest_garl.cases.case import Case
-from pytest_garl.cases.collected_tests import Collection
+from pytest_garl.cases.collected_tests import CollectedProject
 from pytest_garl.cases.new_case import violation_in
 from pytest_garl.cases.reference_proofs import with_sources
 from pytest_garl.cases.replay import SourceHashes, system_of
@@ -55,7 +55,7 @@ class _Order:
 
 def renew(
     cases: Mapping[Path, Case],
-    collection: Collection,
+    collection: CollectedProject,
     simulator: Reference,
     map_folders: tuple[Path, ...],
     workers: int,
@@ -87,7 +87,7 @@ def renew(
 def _order(
     path: Path,
     case: Case,
-    collection: Collection,
+    collection: CollectedProject,
     simulator: Reference,
     map_folders: tuple[Path, ...],
     flights: Path,
@@ -96,7 +96,7 @@ def _order(
     system = system_of(case, _import_folder(case, collection.root))
     tests = collection.tests_of(case.system)
     finders = [test for test in tests if test.nodeid == case.test] or tests
-    files = sorted({file for test in finders for file in test.files})
+    files = sorted({file for test in finders for file in test.data_files})
     sources = SourceHashes(
         system_sha256=sources_sha256(system, data_files(files, collection.root)),
         simulator_sha256=simulator_sha256(simulator),

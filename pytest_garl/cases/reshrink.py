@@ -23,7 +23,7 @@ from pytest_garl.cases.removed import all_removed
 from pytest_garl.cases.replay import SourceHashes, system_of
 from pytest_garl.cases.robustness import NEIGHBOURS
 from pytest_garl.cases.shrink import shrink
-from pytest_garl.cases.simplification import complexity, genome_of
+from pytest_garl.cases.simplification import complexity, genome_of_scenario
 from pytest_garl.cases.user_failure import UserAssertion
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.local_pool import temporary_pool
@@ -268,7 +268,7 @@ class Simplicity:
 
 def simplicity(case: Case, map: Map, *, outdated: bool = False) -> Simplicity:
     """Return how simple a case is."""
-    found = complexity(case.scenario, genome_of(case.scenario, map))
+    found = complexity(case.scenario, genome_of_scenario(case.scenario, map))
     evidence = case.evidence
     return Simplicity(
         grade=found.grade,

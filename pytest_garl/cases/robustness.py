@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pytest_garl.cases.simplification import CHOICES, genome_of
+from pytest_garl.cases.simplification import CHOICES, genome_of_scenario
 from pytest_garl.scenarios.groups import GROUPS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.quantities import Quantity
@@ -29,7 +29,7 @@ def neighbours(scenario: Scenario, map: Map) -> tuple[Scenario, ...]:
     present = dict(scenario.genes)
     items = [
         item
-        for item in genome_of(scenario, map).properties
+        for item in genome_of_scenario(scenario, map).properties
         if item.key in present
         and (present[item.key] != item.nominal or not item.key.startswith("environment."))
         and not item.key.endswith(CHOICES)

@@ -70,7 +70,7 @@ def removals(
         if key.endswith(".velocity") and name != colliding_object:
             found[name] = [_removal(name)]
     active = {each.cause for each in active_conditions(scenario)}
-    for gene in genome_of(scenario, map).genes:
+    for gene in genome_of_scenario(scenario, map).genes:
         nominal = {item.key: item.nominal for item in gene.properties}
         cause = cause_of_key(gene.properties[0].key)
         if cause in active and any(scenario[key] != value for key, value in nominal.items()):
@@ -144,7 +144,7 @@ def empty_scenario(scenario: Scenario, map: Map) -> Scenario:
 
 
 def _nominal(scenario: Scenario, map: Map, colliding_object: str) -> Scenario:
-    steps = simplifications(scenario, genome_of(scenario, map), colliding_object).all
+    steps = simplifications(scenario, genome_of_scenario(scenario, map), colliding_object).all
     return repair(simplified(scenario, steps), map)
 
 
@@ -168,7 +168,7 @@ OBJECT_PLACES = (
 simpler than another, and no choice but the grade, which counts first; only their digits count."""
 
 
-def genome_of(scenario: Scenario, map: Map) -> Genome:
+def genome_of_scenario(scenario: Scenario, map: Map) -> Genome:
     """Return the genome of a scenario's own genes, weather in its full range."""
     return genome_like((key for key, _ in scenario.genes), map)
 
@@ -221,7 +221,7 @@ class Trials:
         self, first: Scenario, fails: Callable[[Scenario], bool], map: Map, budget: int
     ) -> None:
         self.map, self._fails, self._left = map, fails, budget
-        self.genome = genome_of(first, map)
+        self.genome = genome_of_scenario(first, map)
         self._known = {first: True}
         self.history = [first]
         self.flights = 0

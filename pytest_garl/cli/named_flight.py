@@ -22,7 +22,7 @@ from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import airframe_of
 from pytest_garl.messages import command, shortened
 from pytest_garl.reports.films import NO_RECORD, camera_of, recorded_flight, why_no_camera
-from pytest_garl.reports.html.flight_task import FlightTask, record_of
+from pytest_garl.reports.html.flight_task import FlightTask, flight_record_of
 from pytest_garl.reports.mcap.export import Export, Place
 from pytest_garl.scenarios.files import load as load_scenario
 from pytest_garl.scenarios.files import parse_scenario
@@ -108,7 +108,7 @@ class FlightName:
                     f"search:{lines}"
                 )
             task = recorded_flight(opened, found[0])
-        flight, missing = record_of(task)
+        flight, missing = flight_record_of(task)
         if flight is None:
             lost = missing and not any(each.is_file() for each in task.records)
             hint = _how_to_fly_again(task.name, path) if lost else ""
@@ -136,7 +136,7 @@ class FlightName:
         task = self._with_hash(case.evidence.trajectory_sha256, LEDGER.parent)
         if task is None or task.job.system.name != case.system:
             return None, f"no record of its flight at {self.ledger or LEDGER}"
-        flight, missing = record_of(task)
+        flight, missing = flight_record_of(task)
         if flight is None:
             return None, missing
         # These are also the values of the same flight when it is flown again.

@@ -105,7 +105,7 @@ def _note(metafunc: pytest.Metafunc, arguments: MarkerArguments) -> None:
             name=metafunc.definition.originalname,
             system=arguments.target.system_name,
             maps=arguments.all_maps,
-            files=arguments.target.files,
+            data_files=arguments.target.files,
         )
     )
 

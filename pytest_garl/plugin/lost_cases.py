@@ -12,7 +12,7 @@ import pytest
 from pytest_garl.plugin.xdist import is_xdist_worker
 
 if TYPE_CHECKING:
-    from pytest_garl.cases.collected_tests import CollectedTest, Collection
+    from pytest_garl.cases.collected_tests import CollectedProject, CollectedTest
     from pytest_garl.plugin.options import Options
 
 
@@ -96,13 +96,15 @@ def missing_folder(options: Options) -> str:
     )
 
 
-def collection_of(config: pytest.Config, options: Options, collected: Collected) -> Collection:
+def collection_of(
+    config: pytest.Config, options: Options, collected: Collected
+) -> CollectedProject:
     """Return what a session collected."""
-    from pytest_garl.cases.collected_tests import Collection
+    from pytest_garl.cases.collected_tests import CollectedProject
 
-    return Collection(
+    return CollectedProject(
         root=options.root,
-        files=frozenset(collected.files),
+        test_files=frozenset(collected.files),
         tests=tuple(collected.tests),
         file_patterns=tuple(config.getini("python_files")),
         skipped_folders=tuple(config.getini("norecursedirs")),

@@ -54,10 +54,10 @@ def filmed(text: str, *, draws: bool) -> Literal["", "failures"]:
         return ""
     among("film", text, ("failures",))
     if draws:
-        from pytest_garl.reports.film.encoder import program
+        from pytest_garl.reports.film.encoder import find_ffmpeg
 
         try:
-            program()
+            find_ffmpeg()
         except GarlError as error:
             raise pytest.UsageError(f"--garl-film={text}: {error}") from error
     return cast(Literal["failures"], text)

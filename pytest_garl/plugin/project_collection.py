@@ -18,7 +18,7 @@ import pytest
 
 from pytest_garl.cases.case_test_run import end_of, ini_options, run_pytest
 from pytest_garl.cases.census import marked_test_files
-from pytest_garl.cases.collected_tests import CollectedTest, Collection
+from pytest_garl.cases.collected_tests import CollectedProject, CollectedTest
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.plugin.inputs import corpus_of
@@ -38,7 +38,7 @@ class ProjectTests:
     """
 
     cases: Path
-    collection: Collection
+    collection: CollectedProject
     simulator: Reference
     broken: tuple[tuple[str, str], ...]
 
@@ -50,7 +50,7 @@ def collect_project(root: Path, cases: Path | None) -> ProjectTests:
     be collected beside the others, such as a second one of the same name, is collected alone.
     """
     found = _collect(root, cases, ())
-    if len(found.collection.files) + len(found.broken) < 2:
+    if len(found.collection.test_files) + len(found.broken) < 2:
         return found
     for file, _ in found.broken:
         alone = _collect(root, cases, (file,))
@@ -58,7 +58,7 @@ def collect_project(root: Path, cases: Path | None) -> ProjectTests:
             found,
             collection=dataclasses.replace(
                 found.collection,
-                files=found.collection.files | alone.collection.files,
+                test_files=found.collection.test_files | alone.collection.test_files,
                 tests=(*found.collection.tests, *alone.collection.tests),
             ),
             broken=tuple(each for each in found.broken if each[0] != file) + alone.broken,
@@ -84,9 +84,9 @@ def _read(found: dict[str, Any]) -> ProjectTests:
     facts = found["collection"]
     return ProjectTests(
         cases=Path(found["cases"]),
-        collection=Collection(
+        collection=CollectedProject(
             root=Path(facts["root"]),
-            files=frozenset(facts["files"]),
+            test_files=frozenset(facts["test_files"]),
             tests=tuple(_read_test(**each) for each in facts["tests"]),
             file_patterns=tuple(facts["file_patterns"]),
             skipped_folders=tuple(facts["skipped_folders"]),
@@ -96,8 +96,8 @@ def _read(found: dict[str, Any]) -> ProjectTests:
     )
 
 
-def _read_test(maps: list[str], files: list[str], **texts: str) -> CollectedTest:
-    return CollectedTest(maps=tuple(maps), files=tuple(files), **texts)
+def _read_test(maps: list[str], data_files: list[str], **texts: str) -> CollectedTest:
+    return CollectedTest(maps=tuple(maps), data_files=tuple(data_files), **texts)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -147,7 +147,7 @@ def pytest_collection_modifyitems(config: pytest.Config) -> None:
         "cases": str(options.cases),
         "collection": {
             "root": str(collection.root),
-            "files": sorted(collection.files - {*config.stash[_BROKEN]}),
+            "test_files": sorted(collection.test_files - {*config.stash[_BROKEN]}),
             "tests": [dataclasses.asdict(test) for test in collection.tests],
             "file_patterns": collection.file_patterns,
             "skipped_folders": collection.skipped_folders,

@@ -119,12 +119,12 @@ class Tally:
     def run_record(self, run: Run) -> RunRecord:
         """Return the record of the run, read once when all has been flown."""
         if self.record is None:
-            from pytest_garl.reports.run_reading import record_of
+            from pytest_garl.reports.run_reading import run_record_of
 
             if run.options.searches_or_repeats:
                 run.ledger.facts.note_user_failures(self.user_failures)
                 run.ledger.facts.note_ended()
-            self.record = record_of(
+            self.record = run_record_of(
                 run.ledger,
                 run.corpus,
                 investigated=[each.result.case for each in run.investigated if each.result.case],

@@ -17,7 +17,7 @@ from pytest_garl.files.json_values import dataclass_from
 from pytest_garl.landing_system import Camera
 from pytest_garl.messages import shortened
 from pytest_garl.reports.film import save_video
-from pytest_garl.reports.html.flight_task import FlightTask, record_of, task_of
+from pytest_garl.reports.html.flight_task import FlightTask, flight_record_of, task_of
 from pytest_garl.reports.html.page_workers import in_processes
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.placed import Placed
@@ -88,7 +88,7 @@ def draw_film(task: FilmTask) -> None:
     """
     flight = task.flight
     camera = camera_of(flight)
-    record, missing = record_of(flight)
+    record, missing = flight_record_of(flight)
     if record is None:
         raise GarlError(missing or NO_RECORD)
     scenario, map = parse_scenario(flight.scenario), flight.job.load_map()

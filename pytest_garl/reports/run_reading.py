@@ -42,10 +42,10 @@ def read_run(path: Path, corpus: Corpus, *, checked: bool = False) -> RunRecord:
     if not path.is_file():
         raise LedgerError(f"there is no ledger at {path}; run a search first")
     with checked_ledger(path) if checked else contextlib.closing(Ledger(path)) as ledger:
-        return record_of(ledger, corpus)
+        return run_record_of(ledger, corpus)
 
 
-def record_of(
+def run_record_of(
     ledger: Ledger, corpus: Corpus, *, investigated: Sequence[Case] = (), confirming: int = 0
 ) -> RunRecord:
     """Return the run in an open ledger, with the causes that the saved cases tell.

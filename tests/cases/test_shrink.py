@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pytest_garl.cases.shrink import reset_and_bisect, shrink, shrink_by_hypothesis
-from pytest_garl.cases.simplification import complexity, genome_of
+from pytest_garl.cases.simplification import complexity, genome_of_scenario
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
@@ -40,7 +40,7 @@ def test_reset_and_bisect_removes_unneeded_parts_with_few_flights() -> None:
         passes=(reset_and_bisect,),
     )
     assert set(found.simplest.removed_objects) == {*OBJECT_NAMES} - {COLLIDING_OBJECT}
-    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN)).genes == 1
+    assert complexity(found.simplest, genome_of_scenario(VIOLATING_SCENARIO, LAWN)).genes == 1
     assert 0.3 <= found.simplest[f"{COLLIDING_OBJECT}.velocity"] <= 0.3 + 0.9 / 8
     assert found.flights <= 6
 
@@ -50,7 +50,7 @@ def test_shrinking_keeps_the_parts_that_a_failure_needs(fails: Callable[[Scenari
     found = shrink(VIOLATING_SCENARIO, fails, LAWN, 100, colliding_object=COLLIDING_OBJECT)
     assert fails(found.simplest)
     assert problems(found.simplest, LAWN) == ()
-    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN)).genes == (
+    assert complexity(found.simplest, genome_of_scenario(VIOLATING_SCENARIO, LAWN)).genes == (
         2 if fails is in_fog else 1
     )
 
@@ -81,7 +81,7 @@ def test_history_holds_failing_scenarios_from_complex_to_simple() -> None:
     history = shrink(
         VIOLATING_SCENARIO, in_fog, LAWN, 60, colliding_object=COLLIDING_OBJECT
     ).history
-    genome = genome_of(VIOLATING_SCENARIO, LAWN)
+    genome = genome_of_scenario(VIOLATING_SCENARIO, LAWN)
     assert all(in_fog(each) for each in history)
     sizes = [complexity(each, genome) for each in history]
     assert sizes == sorted(sizes, reverse=True)

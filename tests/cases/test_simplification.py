@@ -8,7 +8,7 @@ from pytest_garl.cases.simplification import (
     bare_scenario_around_marker,
     complexity,
     empty_scenario,
-    genome_of,
+    genome_of_scenario,
     simplifications,
     simplified,
     without_other_objects,
@@ -23,7 +23,9 @@ OTHERS = {*OBJECT_NAMES} - {COLLIDING_OBJECT}
 
 def test_simplifications_come_as_objects_and_conditions_the_mildest_first() -> None:
     scenario = VIOLATING_SCENARIO.replace({"environment.fog": 0.15, "environment.dust": 0.01})
-    objects, conditions = simplifications(scenario, genome_of(scenario, LAWN), COLLIDING_OBJECT)
+    objects, conditions = simplifications(
+        scenario, genome_of_scenario(scenario, LAWN), COLLIDING_OBJECT
+    )
     assert {*simplified(scenario, objects).removed_objects} == OTHERS
     first, *others = conditions
     moved = first(scenario)
@@ -64,7 +66,7 @@ def test_empty_scenario_is_nominal_without_objects() -> None:
     assert empty["environment.fog"] == 0.0
 
 
-GENOME = genome_of(VIOLATING_SCENARIO, LAWN)
+GENOME = genome_of_scenario(VIOLATING_SCENARIO, LAWN)
 
 
 def test_complexity_counts_objects_genes_distance_and_digits() -> None:
@@ -109,14 +111,14 @@ def with_story(grade: float, **values: float) -> Scenario:
 def test_lower_grade_is_simpler_than_anything_else() -> None:
     chasing = with_story(2.0).without(*OBJECT_NAMES[1:]).replace({"environment.fog": 0.0})
     careless = with_story(0.0)
-    genome = genome_of(careless, LAWN)
+    genome = genome_of_scenario(careless, LAWN)
     assert complexity(careless, genome) < complexity(chasing, genome)
     assert (complexity(careless, genome).grade, complexity(chasing, genome).grade) == (1, 3)
 
 
 def test_choices_places_and_times_of_a_story_are_not_counted() -> None:
     plain = with_story(1.0)
-    genome = genome_of(plain, LAWN)
+    genome = genome_of_scenario(plain, LAWN)
     name = COLLIDING_OBJECT
     other = {
         f"{name}.phase": 2.0,

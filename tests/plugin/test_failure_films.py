@@ -18,7 +18,7 @@ from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.stored_ledger import checked_ledger
 from pytest_garl.plugin import failure_films
 from pytest_garl.plugin.tally import Tally
-from pytest_garl.reports.run_reading import record_of
+from pytest_garl.reports.run_reading import run_record_of
 from tests.plugin.test_resume import slow_project, start, wait_for
 from tests.reports.html.test_report import lost
 from tests.support.broken_lander import case_of_broken_lander
@@ -219,7 +219,7 @@ def session(
     options = SimpleNamespace(films=tmp_path / "films", workers=2)
     with checked_ledger(write_ledger(tmp_path, flown)) as ledger:
         tally = Tally()
-        tally.record = record_of(ledger, Corpus(tmp_path))
+        tally.record = run_record_of(ledger, Corpus(tmp_path))
         run = SimpleNamespace(options=options, ledger=ledger)
         yield SimpleNamespace(reporter=reporter, run=run, tally=tally)
 

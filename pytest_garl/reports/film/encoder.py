@@ -31,7 +31,7 @@ def write(frames: Iterable[Image], path: Path, rate_hz: float, *, top_kbps: int 
     four seconds.  Raises GarlError where there is no encoder, where the pictures do not fit
     together, or with the encoder's own words where it fails.
     """
-    ffmpeg = program()
+    ffmpeg = find_ffmpeg()
     pictures = iter(frames)
     first = next(pictures, None)
     if first is None:
@@ -101,7 +101,7 @@ def _command(
     return [program, *words.split(), "-f", "mp4", str(path)]
 
 
-def finished(
+def run_command(
     command: Sequence[str], timeout_s: float | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Run a command that reads nothing; return its exit status and what it said."""
@@ -116,7 +116,7 @@ def finished(
     )
 
 
-def program() -> str:
+def find_ffmpeg() -> str:
     """Return an ffmpeg that writes H.264: the one on PATH, else that of imageio-ffmpeg.
 
     Raises GarlError, which says what was found, if there is none.
@@ -151,7 +151,7 @@ def _problem(ffmpeg: str) -> str:
     """Return why an ffmpeg cannot encode; empty if it can."""
     command = [ffmpeg, "-nostdin", "-hide_banner", "-encoders"]
     try:
-        done = finished(command, timeout_s=_PATIENCE_S)
+        done = run_command(command, timeout_s=_PATIENCE_S)
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"{ffmpeg} cannot be run ({error})"
     if done.returncode:

@@ -9,7 +9,7 @@ from pathlib import Path
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import shown
 from pytest_garl.reports.film.drawing import Image
-from pytest_garl.reports.film.encoder import program, write
+from pytest_garl.reports.film.encoder import find_ffmpeg, write
 from pytest_garl.reports.film.gif import write_gif
 
 SUFFIXES = (".mp4", ".gif")
@@ -36,7 +36,7 @@ def check_film_file(path: Path, *, makes_folder: bool = False) -> None:
         raise GarlError(f"{path}: found a folder, expected a file to write; name another one")
     if folder.is_dir() and not os.access(folder, os.W_OK | os.X_OK):
         raise GarlError(f"{path}: the folder {folder} may not be written; name another one")
-    program()
+    find_ffmpeg()
 
 
 def write_film(frames: Iterable[Image], path: Path, rate_hz: float) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from pytest_garl.errors import GarlError
 from pytest_garl.reports.film import camera_pane
 from pytest_garl.reports.film.drawing import Image
-from pytest_garl.reports.film.encoder import encode, finished, no_picture, program
+from pytest_garl.reports.film.encoder import encode, find_ffmpeg, no_picture, run_command
 
 RATE_HZ = 5.0
 """A second of a moving camera takes 0.14 MB at this rate, and twice as much at 10 Hz: measured on
@@ -28,7 +28,7 @@ def write_gif(frames: Iterable[Image], path: Path, rate_hz: float) -> None:
 
     The file appears once it is complete.  Raises GarlError as ``encoder.write`` does.
     """
-    ffmpeg = program()
+    ffmpeg = find_ffmpeg()
     shown_hz = min(RATE_HZ, rate_hz)
     pictures = map(_small, _thinned(frames, rate_hz, shown_hz))
     first = next(pictures, None)
@@ -74,7 +74,7 @@ def _small(picture: Image) -> Image:
 
 
 def _run(command: Sequence[str], path: Path) -> None:
-    done = finished(command)
+    done = run_command(command)
     if done.returncode:
         raise GarlError(
             f"{path}: the encoder {command[0]} gave up (exit status {done.returncode}): "

@@ -117,7 +117,7 @@ def shown_flight(task: FlightTask) -> ShownFlight:
     severity = task.result.severity or NO_SEVERITY
     conditions, placed, notes = _conditions(task)
     traceback = cut_text(crash.traceback or crash.message) if crash else ""
-    flight, missing = record_of(task)
+    flight, missing = flight_record_of(task)
     if flight is None:
         return ShownFlight(
             description=verdict.story,
@@ -179,7 +179,7 @@ def _conditions(task: FlightTask) -> tuple[tuple[ConditionRow, ...], Placed | No
         return (), None, [f"The scenario cannot be shown: {cut_text(str(error), 400)}"]
 
 
-def record_of(task: FlightTask) -> tuple[Flight | None, str]:
+def flight_record_of(task: FlightTask) -> tuple[Flight | None, str]:
     """Return the flight's record, or why it is missing; an empty reason if there was none."""
     if not task.recorded:
         return None, ""

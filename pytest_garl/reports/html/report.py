@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.errors import GarlError
-from pytest_garl.reports.film.encoder import program
+from pytest_garl.reports.film.encoder import find_ffmpeg
 from pytest_garl.reports.html import MOST_FILMS
 from pytest_garl.reports.html.flight_task import ShownFlight
 from pytest_garl.reports.html.folder import check_target, new_folder
@@ -97,7 +97,7 @@ def _cores() -> int:
 def _no_encoder() -> str:
     """Return why there is no encoder; empty if there is one."""
     try:
-        program()
+        find_ffmpeg()
     except GarlError as error:
         return str(error)
     return ""

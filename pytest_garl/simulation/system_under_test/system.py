@@ -30,8 +30,8 @@ class SystemUnderTest:
 
     Every call may raise SystemFailedError, which ends the flight.
     ``needs_camera`` and ``truth_pilot``, a pilot of this package that is told the truth, are known
-    after ``start``.  ``has_stepped`` is whether ``step`` has returned a command, ``gave_up`` whether
-    the last one was ``Abort()``.
+    after ``start``.  ``has_stepped`` is whether ``step`` has returned a command, ``gave_up``
+    whether the last one was ``Abort()``.
     """
 
     def __init__(self, make_system: Callable[[], Any], guard: StepGuard | None) -> None:

@@ -15,7 +15,7 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.reports.film import save_video, write
 from pytest_garl.reports.film.drawing import Image
-from pytest_garl.reports.film.encoder import program
+from pytest_garl.reports.film.encoder import find_ffmpeg
 from pytest_garl.scenarios.placed import Placed
 from tests.support.ffmpeg import LISTS, an_ffmpeg
 from tests.support.videos import FLOWN_S, LAWN, SCENARIO, Hovers, Video
@@ -61,7 +61,7 @@ def decoded(path: Path) -> Iterator[Image]:
 def test_the_ffmpeg_on_path_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     on_path = an_ffmpeg(tmp_path / "bin", LISTS)
     monkeypatch.setenv("PATH", str(on_path.parent), prepend=":")
-    assert program() == str(on_path)
+    assert find_ffmpeg() == str(on_path)
 
 
 @pytest.mark.parametrize(
@@ -72,12 +72,12 @@ def test_an_ffmpeg_that_cannot_encode_is_passed_over(
 ) -> None:
     on_path = an_ffmpeg(tmp_path / "bin", *lines)
     monkeypatch.setenv("PATH", str(on_path.parent), prepend=":")
-    assert program() == imageio_ffmpeg.get_ffmpeg_exe()
+    assert find_ffmpeg() == imageio_ffmpeg.get_ffmpeg_exe()
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(
         GarlError, match=f"libx264: {on_path} .*; the package imageio-ffmpeg is not"
     ):
-        program()
+        find_ffmpeg()
 
 
 def test_without_an_encoder_the_error_says_what_was_looked_for(
