@@ -77,7 +77,7 @@ def lost_case_items(
     from pytest_garl.cases.census import census
     from pytest_garl.plugin.inputs import corpus_of
 
-    lost = census(corpus_of(config), collection_of(config, options, collected))
+    lost = census(corpus_of(config), project_of(config, options, collected))
     return [_item(session, each.path, each.reason) for each in lost]
 
 
@@ -96,9 +96,7 @@ def missing_folder(options: Options) -> str:
     )
 
 
-def collection_of(
-    config: pytest.Config, options: Options, collected: Collected
-) -> CollectedProject:
+def project_of(config: pytest.Config, options: Options, collected: Collected) -> CollectedProject:
     """Return what a session collected."""
     from pytest_garl.cases.collected_tests import CollectedProject
 

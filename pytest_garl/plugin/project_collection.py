@@ -23,7 +23,7 @@ from pytest_garl.errors import GarlError
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.plugin.inputs import corpus_of
 from pytest_garl.plugin.keys import COLLECTED
-from pytest_garl.plugin.lost_cases import collection_of
+from pytest_garl.plugin.lost_cases import project_of
 from pytest_garl.plugin.options import options_of
 
 _BROKEN = pytest.StashKey[dict[str, str]]()
@@ -142,7 +142,7 @@ def pytest_make_collect_report(
 def pytest_collection_modifyitems(config: pytest.Config) -> None:
     """Write what was collected; a collection that a usage error or an exit ends writes nothing."""
     options, own = options_of(config), config.hook.pytest_garl_fly(config=config)
-    collection = collection_of(config, options, config.stash[COLLECTED])
+    collection = project_of(config, options, config.stash[COLLECTED])
     found = {
         "cases": str(options.cases),
         "collection": {
