@@ -34,7 +34,7 @@ from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.columns import STRATA, Columns
+from pytest_garl.search.columns import INTERFERING, Columns
 from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.search.method_catalogue import find_method
 from pytest_garl.simulation.fly import fly
@@ -110,7 +110,7 @@ def run_search(key: Key) -> dict[str, Any]:
 
 
 def _is_quiet(scenario: Scenario, columns: Columns) -> bool:
-    return columns.stratum(encode(scenario, columns.genome)) != STRATA[2]
+    return columns.stratum(encode(scenario, columns.genome)) != INTERFERING
 
 
 def _is_decided(result: FlightResult) -> bool:

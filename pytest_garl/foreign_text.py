@@ -57,7 +57,7 @@ def text_from(make_text: Callable[[], str], limit: int, fallback: str) -> str:
         return f"{fallback} raised {class_name(type(error))}"
 
 
-def shown(value: object) -> str:
+def shown_foreign(value: object) -> str:
     """Return the start of a value's repr; an error in its repr is caught."""
     name = class_name(type(value))
     text = text_from(lambda: brief(value), 10 * SHOWN, f"<{name}>, whose repr()")

@@ -28,7 +28,7 @@ from pytest_garl.files.json_values import dataclass_from
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import divergence_time_s
 from pytest_garl.flight.thresholds import feet_height_m
-from pytest_garl.foreign_text import shown
+from pytest_garl.foreign_text import shown_foreign
 from pytest_garl.landing_system import (
     Mission,
     Observation,
@@ -477,7 +477,7 @@ def _last_place(flight: Flight) -> str:
     if not flight.steps:
         return "before its first command"
     phase = next((s.diagnostics.phase for s in reversed(flight.steps) if s.diagnostics), "")
-    own = f"; its own phase was {shown(phase)}" if phase else ""
+    own = f"; its own phase was {shown_foreign(phase)}" if phase else ""
     return f"{_place(flight, flight.elapsed_s)}{own}"
 
 

@@ -121,7 +121,7 @@ class EscapeModel:
             for npc, situation in zip(npcs, situations, strict=True):
                 npc.decide(situation)
         for npc in npcs:
-            npc.take_in(tick / PHYSICS_RATE_HZ, phases.began_s, motion.position_m)
+            npc.update(tick / PHYSICS_RATE_HZ, phases.began_s, motion.position_m)
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ, npcs)
 
     def _situation(
@@ -188,7 +188,7 @@ class EscapeModel:
         self._known_samples = max(known, index + 1)
         for npc in npcs:
             uav_m = _vector(track.position_m[index])
-            npc.take_in(float(track.time_s[index]), self._phases.began_s, uav_m)
+            npc.update(float(track.time_s[index]), self._phases.began_s, uav_m)
 
     def _place(self, npcs: Sequence[Npc], index: int) -> None:
         for npc, item in zip(npcs, self._chase.flight.objects, strict=True):

@@ -60,7 +60,7 @@ class Twin:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Excuse:
+class KnownCaseMatch:
     """The case that excuses a violation, None if none does; ``reason`` says why not."""
 
     known: KnownCase | None
@@ -104,20 +104,20 @@ class KnownKinds:
         """Return whether a generation and all before it were flown when it was called last."""
         return generation <= self._latest
 
-    def without_twin(self, result: FlightResult, scenario: Scenario) -> Excuse:
+    def without_twin(self, result: FlightResult, scenario: Scenario) -> KnownCaseMatch:
         """Return what a violation's own flight says: whether a case has its cause and is as bad."""
         known = self._known.get(result.signature, ())
         acting = [each for each in known if cause_of_case(each.case).acts_in(scenario)]
         if not acting:
             causes = "; ".join(cause_of_case(each.case).text for each in known)
-            return Excuse(known=None, reason=f"its cause ({causes}) is nominal here")
+            return KnownCaseMatch(known=None, reason=f"its cause ({causes}) is nominal here")
         # The file that names a cause says more than one that takes nothing.
         acting.sort(key=lambda each: not cause_of_case(each.case))
         reasons = [why_worse(result, each.case.worst) for each in acting]
         for each, reason in zip(acting, reasons, strict=True):
             if not reason:
-                return Excuse(known=each)
-        return Excuse(known=None, reason=reasons[0])
+                return KnownCaseMatch(known=each)
+        return KnownCaseMatch(known=None, reason=reasons[0])
 
     def twin(self, ending: str) -> Twin | None:
         """Return the twin of a kind; None if it has none, or no violation that needs one yet."""

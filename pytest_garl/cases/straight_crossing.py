@@ -17,7 +17,7 @@ from pytest_garl.cases.simplification import MARKER_PLACE
 from pytest_garl.flight.flight import Flight, ObjectRecord
 from pytest_garl.scenarios.bodies import Disc, discs_of
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES, ObjectType
+from pytest_garl.scenarios.object_types import BIRD_HEIGHTS_M, OBJECT_TYPES, ObjectType
 from pytest_garl.scenarios.placed import Placed, start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, STORY, with_all_values
@@ -197,7 +197,9 @@ def _with_story(
     values = {f"{name}.velocity": kind.share_of(encounter.usual_speed_mps)}
     if kind.flies:
         # Its own height may be lower than a stoop ends.
-        height_m = round(min(HEIGHTS_M[1], max(HEIGHTS_M[0], LEAST_HEIGHT_M, z)), PLACE_DIGITS)
+        height_m = round(
+            min(BIRD_HEIGHTS_M[1], max(BIRD_HEIGHTS_M[0], LEAST_HEIGHT_M, z)), PLACE_DIGITS
+        )
         if height_m != placed.npc(name).height_m or bare.get(f"{name}.{HEIGHT}", 0.0):
             values[f"{name}.{HEIGHT}"] = height_m
     values |= start_genes(name, start, map)

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from pytest_garl.cli.flight_options import names_flight
+from pytest_garl.cli.flight_options import flight_options
 from pytest_garl.cli.named_flight import FlightName, NamedFlight
 from pytest_garl.cli.shared import say
 from pytest_garl.errors import OptionError
@@ -19,7 +19,7 @@ SUFFIX = ".mcap"
 
 
 @click.command()
-@names_flight
+@flight_options
 @click.option(
     "--mcap",
     metavar="FILE",

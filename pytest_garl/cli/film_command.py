@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from pytest_garl.cli.flight_options import names_flight
+from pytest_garl.cli.flight_options import flight_options
 from pytest_garl.cli.named_flight import CASE, RECORD, FlightName, NamedFlight
 from pytest_garl.cli.shared import say
 from pytest_garl.errors import GarlError
@@ -16,7 +16,7 @@ from pytest_garl.reports.film.film_file import check_film_file
 
 
 @click.command()
-@names_flight
+@flight_options
 @click.option(
     "-o",
     "--out",

@@ -31,7 +31,7 @@ _OPTIONS = (
 )
 
 
-def names_flight(command: Any) -> Any:
+def flight_options(command: Any) -> Any:
     """Add the argument and the options of which a ``FlightName`` is made to a command."""
     for option in reversed(_OPTIONS):
         command = option(command)

@@ -59,7 +59,7 @@ class SearchKey:
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
-class UserFailure:
+class FailedFlightAssertion:
     """A failed assertion about a user's own property, in the flight of a slot.
 
     ``search`` is the key of its search in the ledger.
@@ -234,15 +234,16 @@ class Facts:
         """Return (signature, trajectory's hash) of each probe that a system violates."""
         return [(str(a), str(b)) for a, b in self._get(f"violated probes of {search}") or ()]
 
-    def note_user_failures(self, failures: Iterable[UserFailure]) -> None:
+    def note_user_failures(self, failures: Iterable[FailedFlightAssertion]) -> None:
         """Note the failed assertions about users' own properties."""
         self._set(_USER_FAILURES, [dataclasses.asdict(each) for each in failures])
 
     @property
-    def user_failures(self) -> list[UserFailure]:
+    def user_failures(self) -> list[FailedFlightAssertion]:
         """The failed assertions about users' own properties."""
         return [
-            self._typed(UserFailure, _USER_FAILURES, e) for e in self._get(_USER_FAILURES) or ()
+            self._typed(FailedFlightAssertion, _USER_FAILURES, e)
+            for e in self._get(_USER_FAILURES) or ()
         ]
 
     # Of a session: a resumed run forgets them, because its tests run again.

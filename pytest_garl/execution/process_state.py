@@ -37,9 +37,9 @@ FLYING = (
 """Modules that a flight imports; they import the rest."""
 SHARED = {"cv2", "json", "math", "numpy", "os", "pathlib", "pybullet", "random", "struct", "time"}
 """Foreign packages with which the simulator computes."""
-MOST_THREADS = 8
-MOST_FILES = 64
-MOST_BYTES = 2**30
+MAX_LEFT_THREADS = 8
+MAX_LEFT_FILES = 64
+MAX_MEMORY_GROWTH_BYTES = 2**30
 """If flights leave more threads, open files or bytes of memory, their process is replaced."""
 _LIMITED = (
     resource.RLIMIT_NOFILE,
@@ -88,9 +88,9 @@ class ProcessState:
         return (
             _has_live_children()
             or self._settings != _settings()
-            or threading.active_count() > MOST_THREADS
-            or _open_files() > self._files + MOST_FILES
-            or peak > self._bytes + MOST_BYTES
+            or threading.active_count() > MAX_LEFT_THREADS
+            or _open_files() > self._files + MAX_LEFT_FILES
+            or peak > self._bytes + MAX_MEMORY_GROWTH_BYTES
             or any(
                 space.get(name, _GONE) is not value
                 for space, values in self._namespaces

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-HEIGHTS_M = (8.0, 3.0, 0.1)
+PHASE_HEIGHTS_M = (8.0, 3.0, 0.1)
 """Heights of the feet above the ground that begin the phases after the start of the flight."""
-ABOVE_M = 0.5
+DESCENT_HYSTERESIS_M = 0.5
 """A UAV sinks past a height if it was higher by this: it takes off from below."""
 
 
@@ -18,7 +18,7 @@ class LandingPhases:
 
     def __init__(self) -> None:
         self._peak_m = 0.0
-        self._began_s = [0.0, *(math.inf for _ in HEIGHTS_M)]
+        self._began_s = [0.0, *(math.inf for _ in PHASE_HEIGHTS_M)]
 
     @property
     def began_s(self) -> tuple[float, ...]:
@@ -28,7 +28,7 @@ class LandingPhases:
     def update(self, time_s: float, height_m: float) -> None:
         """Take in the height of the feet above the ground."""
         self._peak_m = max(self._peak_m, height_m)
-        for number, limit_m in enumerate(HEIGHTS_M, start=1):
-            if height_m <= limit_m <= self._peak_m - ABOVE_M:
+        for number, limit_m in enumerate(PHASE_HEIGHTS_M, start=1):
+            if height_m <= limit_m <= self._peak_m - DESCENT_HYSTERESIS_M:
                 for each in range(1, number + 1):
                     self._began_s[each] = min(self._began_s[each], time_s)

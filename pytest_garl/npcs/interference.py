@@ -55,7 +55,7 @@ class Perception:
         late = round(limits.delay_s / DECISION_STEP_S)
         self._seen: deque[tuple[Vector, Vector] | None] = deque(maxlen=late + 1)
 
-    def take_in(self, situation: Situation) -> None:
+    def update(self, situation: Situation) -> None:
         """Look at the UAV."""
         found = None
         if self._is_in_sight(situation):
@@ -133,7 +133,7 @@ class Interference:
 
     def look(self, situation: Situation) -> Belief | None:
         """Take a situation in; return what the NPC believes if it decides now."""
-        self._perception.take_in(situation)
+        self._perception.update(situation)
         now, begins_s = situation.time_s, self._story.begins_s(situation.phases_s)
         if now < begins_s or self._way_out is not None:
             return None

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import pytest
 
-from pytest_garl.cases.known_kinds import Excuse, KnownCase, KnownKinds
+from pytest_garl.cases.known_kinds import KnownCase, KnownCaseMatch, KnownKinds
 from pytest_garl.cases.reference_proofs import Proofs, proves_reference
 from pytest_garl.cases.replay import SourceHashes, stale_reasons
 from pytest_garl.errors import LedgerError
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 REFLIGHTS = 4
 """A violation of a system that need not be deterministic is flown so many times more."""
-NOTHING_KNOWN = Excuse(known=None)
+NOTHING_KNOWN = KnownCaseMatch(known=None)
 FilmKey = tuple[str, ...]
 """What a film shows: (name of its search, signature) of a kind, or (name,) of a saved case."""
 
@@ -389,7 +389,7 @@ class KnownViolations:
         self._run = run
         self._kinds: dict[str, KnownKinds] = {}
 
-    def excuse(self, target: Target, ending: str) -> Excuse:
+    def excuse(self, target: Target, ending: str) -> KnownCaseMatch:
         """Return the case that excuses a violation in a flown slot of a search, or why none does.
 
         Waits for the slot's generation, and for the twin of the kind.  A repeated scenario is
@@ -410,7 +410,7 @@ class KnownViolations:
             return excuse
         if kinds.is_refuted(ending, twin, self._run.wait(twin.flight).result):
             reason = f"the search's first violation of the kind fails without {twin.cause.text} too"
-            return Excuse(known=None, reason=reason)
+            return KnownCaseMatch(known=None, reason=reason)
         return excuse
 
     def files(self, target: Target, ending: str) -> str:

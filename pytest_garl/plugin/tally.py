@@ -12,7 +12,7 @@ import pytest
 from pytest_garl.plugin.keys import RECORD_PREFIX
 
 if TYPE_CHECKING:
-    from pytest_garl.execution.facts import UserFailure
+    from pytest_garl.execution.facts import FailedFlightAssertion
     from pytest_garl.plugin.item_record import ItemRecord
     from pytest_garl.plugin.run import Run
     from pytest_garl.reports.run_record import RunRecord
@@ -101,12 +101,12 @@ class Tally:
         }
 
     @property
-    def user_failures(self) -> list[UserFailure]:
+    def user_failures(self) -> list[FailedFlightAssertion]:
         """The failed assertions about users' own properties, expected ones among them."""
-        from pytest_garl.execution.facts import UserFailure
+        from pytest_garl.execution.facts import FailedFlightAssertion
 
         return [
-            UserFailure(
+            FailedFlightAssertion(
                 search=record.search,
                 slot=record.slot or "",
                 signature=record.failure_signature,

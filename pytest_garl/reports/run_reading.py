@@ -13,7 +13,7 @@ from types import MappingProxyType
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.corpus import Corpus
 from pytest_garl.errors import LedgerError
-from pytest_garl.execution.facts import SearchKey, UserFailure, search_names
+from pytest_garl.execution.facts import FailedFlightAssertion, SearchKey, search_names
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
@@ -121,7 +121,7 @@ def _searches(ledger: Ledger, jobs: dict[str, FlightJob]) -> list[SearchRecord]:
 def _search(
     key: SearchKey,
     flights: Sequence[LedgerFlight],
-    user_failures: Iterable[UserFailure],
+    user_failures: Iterable[FailedFlightAssertion],
     method: str | None,
 ) -> SearchRecord:
     # (slot, story) of all violations, by signature.

@@ -88,7 +88,7 @@ class ObjectType:
         return min(1.0, max(_LEAST_SHARE if self.flies else 0.0, share))
 
 
-HEIGHTS_M = (1.0, 15.0)
+BIRD_HEIGHTS_M = (1.0, 15.0)
 """Heights at which a scenario may let birds fly: their wings clear the ground, and an approach at
 the paper's 10 m is met from below and from above."""
 

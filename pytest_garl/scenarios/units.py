@@ -22,7 +22,7 @@ from pytest_garl.scenarios.light import (
     sun_elevation_deg,
 )
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES
+from pytest_garl.scenarios.object_types import BIRD_HEIGHTS_M, OBJECT_TYPES
 from pytest_garl.scenarios.placed import MARKER_RADIUS_M, Placed, marker_genes, place_genes
 from pytest_garl.scenarios.quantities import Quantity, significant
 from pytest_garl.scenarios.scenario import Scenario
@@ -175,7 +175,7 @@ def ranges_of(head: str, map: Map) -> dict[str, tuple[float, float]]:
         for end in ("start", "destination"):
             places |= {f"{end}_x_m": (x_min, x_max), f"{end}_y_m": (y_min, y_max)}
         kind = OBJECT_TYPES[kinds[head]]
-        heights = {HEIGHT: HEIGHTS_M} if kind.flies else {}
+        heights = {HEIGHT: BIRD_HEIGHTS_M} if kind.flies else {}
         told = {
             each.name: (each.quantity.low, each.quantity.high)
             for each in STORY.values()

@@ -12,7 +12,8 @@ from pytest_garl.scenarios.story import GRADES
 from pytest_garl.search.operators import Matrix
 
 Mask = NDArray[np.bool_]
-STRATA = ("nobody", "careless", "interfering")
+NOBODY, CARELESS, INTERFERING = "nobody", "careless", "interfering"
+STRATA = (NOBODY, CARELESS, INTERFERING)
 """Scenarios without NPCs, with careless ones, and with one that knows of the UAV."""
 
 
@@ -20,19 +21,20 @@ STRATA = ("nobody", "careless", "interfering")
 class OptionalGene:
     """An optional gene: its columns, and what is special about it.
 
-    ``bit`` is the column of its bit of activity, ``values`` those behind it.  ``grade`` is the
-    column of an NPC's grade, ``begins`` that of an event's begin, ``lasts`` that of how long it
-    lasts, ``place`` that of a decoy's place to the east, before that to the north; -1 without one.
+    ``bit`` is the column of its bit of activity, ``values`` those behind it.  ``grade_column`` is
+    that of an NPC's grade, ``begins_column`` that of an event's begin, ``lasts_column`` that of how
+    long it lasts, ``place_column`` that of a decoy's place to the east, before that to the north;
+    -1 without one.
     """
 
     name: str
     bit: int
     values: slice
     is_npc: bool
-    grade: int = -1
-    begins: int = -1
-    lasts: int = -1
-    place: int = -1
+    grade_column: int = -1
+    begins_column: int = -1
+    lasts_column: int = -1
+    place_column: int = -1
 
 
 class Columns:
@@ -63,10 +65,10 @@ class Columns:
     def strata(self) -> tuple[str, ...]:
         """The strata that the genome has; none without optional genes."""
         npcs = [gene for gene in self.optional if gene.is_npc]
-        found = ["nobody"] if len(npcs) < len(self.optional) else []
-        grades = [self.upper[gene.grade] for gene in npcs if gene.grade >= 0]
-        found += ["careless"] if npcs else []
-        found += ["interfering"] if any(each > 1 for each in grades) else []
+        found = [NOBODY] if len(npcs) < len(self.optional) else []
+        grades = [self.upper[gene.grade_column] for gene in npcs if gene.grade_column >= 0]
+        found += [CARELESS] if npcs else []
+        found += [INTERFERING] if any(each > 1 for each in grades) else []
         return tuple(found)
 
     def active(self, row: Matrix) -> tuple[OptionalGene, ...]:
@@ -93,10 +95,12 @@ class Columns:
         """Return the stratum of a row."""
         npcs = [gene for gene in self.active(row) if gene.is_npc]
         if not npcs:
-            return STRATA[0]
+            return NOBODY
         # An NPC without a grade is moved by a policy that knows of the UAV.
-        grades = [row[gene.grade] if gene.grade >= 0 else len(GRADES) for gene in npcs]
-        return STRATA[1] if max(grades) < 1 else STRATA[2]
+        grades = [
+            row[gene.grade_column] if gene.grade_column >= 0 else len(GRADES) for gene in npcs
+        ]
+        return CARELESS if max(grades) < 1 else INTERFERING
 
     def harshness(self, values: Matrix, gene: OptionalGene) -> float:
         """Return how far a gene's outward values lie from nominal: the sum of shares of ranges."""
@@ -123,9 +127,9 @@ def _optional_gene(gene: NuclearGene, first: int) -> OptionalGene:
         bit=first,
         values=slice(first + 1, first + len(keys)),
         is_npc=f"{gene.name}.velocity" in keys,
-        grade=column("grade"),
-        begins=column("from_s"),
-        lasts=column("lasts_s"),
+        grade_column=column("grade"),
+        begins_column=column("from_s"),
+        lasts_column=column("lasts_s"),
         # A domain may take away one of the two.
-        place=column("x_m") if column("y_m") >= 0 else -1,
+        place_column=column("x_m") if column("y_m") >= 0 else -1,
     )

@@ -1,4 +1,7 @@
-"""Scenarios without parents, of a stratum: a few of the optional genes act, so that it shows."""
+"""Draws scenarios that have no parents.
+
+Only a few optional genes act in each, so that one can see the effect of each gene.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ import numpy as np
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placed import Placed
-from pytest_garl.search.columns import STRATA, Columns, OptionalGene
+from pytest_garl.search.columns import CARELESS, NOBODY, Columns, OptionalGene
 from pytest_garl.search.operators import Matrix
 
 LONE_NPC_SHARE = 0.8
@@ -35,7 +38,8 @@ class Exploration:
     """
 
     draws = 8
-    """Draws of a condition's values, of which those are flown that show most."""
+    """How many values are drawn for a condition; the most extreme one is flown.  That of a decoy is
+    the nearest to the UAV's way."""
 
     def __init__(self, columns: Columns, map: Map) -> None:
         self._columns, self._map = columns, map
@@ -56,10 +60,12 @@ class Exploration:
         active = [gene for gene in columns.optional if gene.name in names]
         for gene in active:
             row[gene.values] = self.values(gene, row, rng)
-            if gene.is_npc and gene.grade >= 0:
-                low, high = (0.0, 1.0) if stratum == STRATA[1] else (1.0, columns.upper[gene.grade])
-                top = np.nextafter(min(high, columns.upper[gene.grade]), low)
-                row[gene.grade] = rng.uniform(low, top) if top > low else low
+            if gene.is_npc and gene.grade_column >= 0:
+                low, high = (
+                    (0.0, 1.0) if stratum == CARELESS else (1.0, columns.upper[gene.grade_column])
+                )
+                top = np.nextafter(min(high, columns.upper[gene.grade_column]), low)
+                row[gene.grade_column] = rng.uniform(low, top) if top > low else low
         self.let_coincide(row, active, rng)
         return row
 
@@ -72,7 +78,7 @@ class Exploration:
 
     def choose(self, gene: OptionalGene, row: Matrix, drawn: Sequence[Matrix]) -> Matrix:
         """Return the values that show most: a decoy near the UAV's way, others far from nominal."""
-        if gene.place >= 0:
+        if gene.place_column >= 0:
             return self.nearest_to_way(gene, row, drawn)
         return max(drawn, key=lambda values: self._columns.harshness(values, gene))
 
@@ -81,9 +87,9 @@ class Exploration:
         columns = self._columns
         npcs = [gene.name for gene in columns.optional if gene.is_npc]
         others = [gene.name for gene in columns.optional if not gene.is_npc]
-        size = min(columns.limit, len(others) + len(npcs) * (stratum != STRATA[0]))
+        size = min(columns.limit, len(others) + len(npcs) * (stratum != NOBODY))
         count = 0
-        if stratum != STRATA[0]:
+        if stratum != NOBODY:
             count = 1 if rng.random() < LONE_NPC_SHARE else min(2, len(npcs), size)
         left = min(size - count, len(others))
         pair = self.pair_of_events(rng) if left >= 2 else ()
@@ -96,7 +102,7 @@ class Exploration:
 
         A pair does not count for ``least_flown``, so that events act without another one as well.
         """
-        events = [gene.name for gene in self._columns.optional if gene.begins >= 0]
+        events = [gene.name for gene in self._columns.optional if gene.begins_column >= 0]
         if len(events) < 2 or rng.random() >= EVENT_PAIR_SHARE:
             return ()
         pairs = itertools.combinations(events, 2)
@@ -114,11 +120,11 @@ class Exploration:
 
     def while_flying(self, gene: OptionalGene, values: Matrix) -> Matrix:
         """Return values whose event begins before a flight ends."""
-        if gene.begins < 0:
+        if gene.begins_column < 0:
             return values
-        low, high = self._columns.lower[gene.begins], self._columns.upper[gene.begins]
+        low, high = self._columns.lower[gene.begins_column], self._columns.upper[gene.begins_column]
         share = min(1.0, max(0.0, self.flight_s - low) / (high - low))
-        moved, index = values.copy(), gene.begins - gene.values.start
+        moved, index = values.copy(), gene.begins_column - gene.values.start
         moved[index] = low + share * (values[index] - low)
         return moved
 
@@ -126,24 +132,27 @@ class Exploration:
         self, row: Matrix, active: Sequence[OptionalGene], rng: np.random.Generator
     ) -> None:
         """Let some events begin while another lasts, in place: what they do together shows then."""
-        events = [gene for gene in active if gene.begins >= 0]
+        events = [gene for gene in active if gene.begins_column >= 0]
         for first, second in itertools.pairwise(events):
             if rng.random() >= COINCIDENT_SHARE:
                 continue
-            begin = row[first.begins] - self._lasts(second, row)
-            end = row[first.begins] + self._lasts(first, row)
-            low, high = self._columns.lower[second.begins], self._columns.upper[second.begins]
-            row[second.begins] = np.clip(rng.uniform(begin, end), low, high)
+            begin = row[first.begins_column] - self._lasts(second, row)
+            end = row[first.begins_column] + self._lasts(first, row)
+            low, high = (
+                self._columns.lower[second.begins_column],
+                self._columns.upper[second.begins_column],
+            )
+            row[second.begins_column] = np.clip(rng.uniform(begin, end), low, high)
 
     def _lasts(self, gene: OptionalGene, row: Matrix) -> float:
-        return float(row[gene.lasts]) if gene.lasts >= 0 else 0.0
+        return float(row[gene.lasts_column]) if gene.lasts_column >= 0 else 0.0
 
     def nearest_to_way(self, gene: OptionalGene, row: Matrix, drawn: Sequence[Matrix]) -> Matrix:
         """Return the decoy that lies nearest to the way to the coordinate that the UAV is told."""
         scenario = decode(row, self._columns.genome, map=self._map.name, seed=0)
         start, middle = np.array(self._map.uav_start_m[:2]), np.array(self._map.gps_position_m)
         way = np.array(Placed(scenario, self._map).told_m) - start
-        first = gene.place - gene.values.start
+        first = gene.place_column - gene.values.start
 
         def off_way_m(values: Matrix) -> float:
             place = middle + values[first : first + 2] - start

@@ -203,7 +203,7 @@ class Loop:
             moves = [npc.decide(self.situation(npc)) for npc in self.npcs]
             self._change([change for move in moves for change in move.changes])
         for npc in self.npcs:
-            npc.take_in(self.recorder.time_s, self.phases.began_s, uav_m)
+            npc.update(self.recorder.time_s, self.phases.began_s, uav_m)
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ, self.npcs)
             self._world.move(npc.name, npc.position_m, npc.yaw_rad, npc.velocity_mps)
 

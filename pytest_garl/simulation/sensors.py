@@ -108,7 +108,7 @@ class Sensors:
             spin_radps=rotate(motion.attitude, motion.spin_radps),
         )
         frame = self._renderer.render(eye, attitude, now, poses, movement)
-        frame.measured_m = self._depth.measured(frame.depth_m, now)
+        frame.measured_depth_m = self._depth.measured(frame.depth_m, now)
         sight = self._recorder.sight(frame, self._renderer, eye)
         if self._freezes:
             self._last_look = frame, sight

@@ -25,7 +25,7 @@ def perceived(limits_name: str, *uavs: tuple[float, float, float]) -> Sighting |
     """Return what an NPC at the origin perceives after decisions with the UAV at these places."""
     own = Perception(GRADE_LIMITS[limits_name], dataclasses.replace(LAWN, bodies=()))
     for place in uavs:
-        own.take_in(situation(being((0.0, 0.0)), uav=place))
+        own.update(situation(being((0.0, 0.0)), uav=place))
     return own.sighting
 
 
@@ -55,7 +55,7 @@ def test_what_is_solid_hides_the_uav() -> None:
     for map, hidden in ((LAWN, True), (dataclasses.replace(LAWN, bodies=()), False)):
         own = Perception(CHASING, map)
         for _ in range(3):
-            own.take_in(situation(being(here), uav=uav))
+            own.update(situation(being(here), uav=uav))
         assert (own.sighting is None) is hidden
 
 

@@ -15,7 +15,7 @@ from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.groups import GROUPS, QUANTITIES
 from pytest_garl.scenarios.maps.loading import load_map, map_names
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.object_types import HEIGHTS_M
+from pytest_garl.scenarios.object_types import BIRD_HEIGHTS_M
 from pytest_garl.scenarios.placed import MARKER_RADIUS_M, Placed, marker_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Start, Task
@@ -45,7 +45,7 @@ def any_scenario(draw: st.DrawFn, map: Map) -> Scenario:
     genes = {item.key: draw(st.floats(item.low, item.high)) for item in genome.properties}
     names = [name for name, kind in map.all_objects if kind == "bird"]
     for name in draw(st.lists(st.sampled_from(names), unique=True)) if names else []:
-        genes[f"{name}.height_m"] = draw(st.floats(*HEIGHTS_M))
+        genes[f"{name}.height_m"] = draw(st.floats(*BIRD_HEIGHTS_M))
     scenario = Scenario(map=map.name, seed=5, genes=tuple(genes.items()), task=genome.task)
     objects = [name for name, _ in map.all_objects]
     return scenario.without(*draw(st.lists(st.sampled_from(objects), unique=True)))

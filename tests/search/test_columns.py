@@ -38,7 +38,7 @@ def test_a_decoy_has_a_place_unless_the_domain_takes_it_away(
     file.write_text(f'extends = "field"\n[decoy-1]\n{ranges}\n')
     columns = Columns(genome_of(domain_named(str(file)), MAP))
     (decoy,) = (gene for gene in columns.optional if gene.name == "decoy-1")
-    assert (decoy.place >= 0) == has_place
+    assert (decoy.place_column >= 0) == has_place
     exploration, rng = Exploration(columns, MAP), np.random.default_rng(0)
     for _ in range(40):
         row = exploration.new("nobody", rng)

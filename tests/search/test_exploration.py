@@ -53,7 +53,9 @@ def test_conditions_are_harsher_than_the_domain_draws_them() -> None:
 def test_events_begin_while_flights_last(name: str, flight_s: float, latest_s: float) -> None:
     ours, rng, gene = exploration(flight_s), np.random.default_rng(0), GENES[name]
     row = COLUMNS.genome.random(rng)
-    begins = [ours.values(gene, row, rng)[gene.begins - gene.values.start] for _ in range(200)]
+    begins = [
+        ours.values(gene, row, rng)[gene.begins_column - gene.values.start] for _ in range(200)
+    ]
     assert 0.9 * latest_s < max(begins) <= latest_s
 
 
@@ -66,7 +68,8 @@ def test_half_of_the_pairs_of_events_coincide() -> None:
         if {"outage", "cover"} <= {gene.name for gene in COLUMNS.active(row)}:
             pairs += 1
             spans = [
-                (row[each.begins], row[each.begins] + row[each.lasts]) for each in (outage, cover)
+                (row[each.begins_column], row[each.begins_column] + row[each.lasts_column])
+                for each in (outage, cover)
             ]
             together += max(start for start, _ in spans) < min(end for _, end in spans)
     assert pairs > 20
@@ -85,7 +88,7 @@ def test_decoys_lie_nearer_to_the_way_than_the_domain_puts_them() -> None:
             row[gene.values] = ours.values(gene, row, rng)
             scenario = decode(row, COLUMNS.genome, map=MAP.name, seed=0)
             told = np.array(Placed(scenario, MAP).told_m)
-            place = middle + row[gene.place : gene.place + 2]
+            place = middle + row[gene.place_column : gene.place_column + 2]
             line = [start + share * (told - start) for share in np.linspace(0, 1, 200)]
             distances.append(min(float(np.linalg.norm(place - each)) for each in line))
         return float(np.mean(distances))

@@ -77,7 +77,7 @@ def walk(
                 npc.policy.reset(situation, np.random.default_rng(0))
             npc.decide(situation)
         known = tuple(each if each <= now else NEVER for each in phases)
-        npc.take_in(now, known, uav(now))
+        npc.update(now, known, uav(now))
         npc.advance(TICK_S)
         places.append(npc.position_m)
     return np.array(places)

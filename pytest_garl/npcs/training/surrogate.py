@@ -28,7 +28,7 @@ from pytest_garl.npcs.training.uav_models import (
     StraightPilot,
 )
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES
+from pytest_garl.scenarios.object_types import BIRD_HEIGHTS_M, OBJECT_TYPES
 from pytest_garl.scenarios.placed import Placed, start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, LIMITS_S, with_all_values
@@ -257,7 +257,7 @@ def _with_story(
     genes = dict(scenario.genes) | with_all_values(values, name, kind)
     genes |= start_genes(name, _near(scenario, map, name, grade), map)
     if OBJECT_TYPES[kind].flies:
-        bird_m = float(rng.uniform(HEIGHTS_M[0], height_m))
+        bird_m = float(rng.uniform(BIRD_HEIGHTS_M[0], height_m))
         genes[f"{name}.height_m"] = bird_m
         genes[f"{name}.stoop_m"] = float(rng.choice([0.0, rng.uniform(0, bird_m)]))
     angle, offset = rng.uniform(0, 2 * math.pi), float(rng.uniform(0, START_OFFSET_M))

@@ -13,7 +13,7 @@ from pytest_garl.scenarios.genes import WeatherRange, genome_for
 from pytest_garl.scenarios.groups import GROUPS, QUANTITIES, WEATHER
 from pytest_garl.scenarios.light import NOON_DEG, TWILIGHT_DEG
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.object_types import HEIGHTS_M
+from pytest_garl.scenarios.object_types import BIRD_HEIGHTS_M
 from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, STORY, story_of
@@ -37,8 +37,8 @@ _LIGHT = Quantity(
 )
 _HEIGHT = Quantity(
     key=BIRD_HEIGHT,
-    low=HEIGHTS_M[0],
-    high=HEIGHTS_M[1],
+    low=BIRD_HEIGHTS_M[0],
+    high=BIRD_HEIGHTS_M[1],
     nominal=3.0,
     meaning="height at which birds fly",
     source="engineering estimate: from above people's heads to above the search height",

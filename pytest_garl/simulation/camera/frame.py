@@ -18,8 +18,8 @@ class Frame:
     number of pixels of each segment; it does not count the ground, segment 0.  ``image`` is
     painted on first access, and does not depend on the time of that access.  ``marker`` says how
     the frame shows the marker, None where it does not; it needs no picture.  ``marker_area_px`` is
-    the projected area of the marker, clipped to the frame, with nothing in front.  ``measured_m``
-    is the depth as the depth camera measures it, 0 where it measures nothing.
+    the projected area of the marker, clipped to the frame, with nothing in front.
+    ``measured_depth_m`` is the depth as the depth camera measures it, 0 where it measures nothing.
     """
 
     __slots__ = (
@@ -28,7 +28,7 @@ class Frame:
         "_marker_area_px",
         "_paint",
         "depth_m",
-        "measured_m",
+        "measured_depth_m",
         "pixels",
         "segmentation",
     )
@@ -45,7 +45,7 @@ class Frame:
     ) -> None:
         self._paint, self._marker, self._marker_area_px = paint, marker, marker_area_px
         self._image: NDArray[np.uint8] | None = None
-        self.depth_m = self.measured_m = depth_m
+        self.depth_m = self.measured_depth_m = depth_m
         self.segmentation = segmentation
         self.pixels = pixels
 

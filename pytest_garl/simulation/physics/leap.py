@@ -47,7 +47,7 @@ class Leap:
         since_s = self._now_s - self._began_s
         return max(0.0, self._lift_mps * since_s - GRAVITY_MPS2 * since_s**2 / 2)
 
-    def take_in(
+    def update(
         self,
         time_s: float,
         phases_s: tuple[float, ...],

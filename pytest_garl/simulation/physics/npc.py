@@ -126,14 +126,14 @@ class Npc:
             solid for solid in self._solids if gap_m(solid, (self.x_m, self.y_m)) < reach
         ]
 
-    def take_in(
+    def update(
         self, time_s: float, phases_s: tuple[float, ...], uav_m: tuple[float, float, float]
     ) -> None:
         """Take in the time, when the phases of the landing began, and where the UAV is.
 
         A bird may come now, and a dog leap.
         """
-        self._leap.take_in(time_s, phases_s, (self.x_m, self.y_m), uav_m)
+        self._leap.update(time_s, phases_s, (self.x_m, self.y_m), uav_m)
         path = self.bird_path
         if path is not None and path.comes(time_s, phases_s):
             (self.x_m, self.y_m), self.yaw_rad = path.entry_m, path.course_rad

@@ -7,7 +7,7 @@ import json
 import math
 from typing import Any
 
-from pytest_garl.foreign_text import cut, shown
+from pytest_garl.foreign_text import cut, shown_foreign
 from pytest_garl.landing_system import Detection, Diagnostics
 from pytest_garl.simulation.system_under_test.reading import (
     NonsenseError,
@@ -27,7 +27,7 @@ MOST_CORNERS = 32
 MOST_POINTS = 1_000
 POINTS_KEPT = 100
 """A flight has 1,200 frames at the default rate, and its record keeps the path of each."""
-MOST_BYTES = 24_000_000
+MAX_DIAGNOSTICS_BYTES = 24_000_000
 """Largest size of all diagnostics of a flight; ``flight_file.py`` loads records up to 32 MB."""
 FULL_SHARE = 0.25
 """Share of these bytes in which paths, corners and notes are recorded too."""
@@ -40,14 +40,14 @@ class DiagnosticsQuota:
     """Limits the bytes of a landing system's diagnostics in the record of one flight."""
 
     def __init__(self) -> None:
-        self._left = MOST_BYTES
+        self._left = MAX_DIAGNOSTICS_BYTES
 
     def shorten(self, diagnostics: Diagnostics, field: str) -> Diagnostics:
         """Return the diagnostics to record.
 
         Once a quarter of the quota is used, these are only what verdicts need.
         """
-        if self._left < (1 - FULL_SHARE) * MOST_BYTES:
+        if self._left < (1 - FULL_SHARE) * MAX_DIAGNOSTICS_BYTES:
             diagnostics = dataclasses.replace(
                 diagnostics,
                 detections=tuple(
@@ -59,8 +59,8 @@ class DiagnosticsQuota:
         self._left -= _bytes_of(diagnostics)
         if self._left < 0:
             raise NonsenseError(
-                f"{field}: those of this flight fill more than {MOST_BYTES} bytes; expected fewer "
-                "detections in each frame",
+                f"{field}: those of this flight fill more than {MAX_DIAGNOSTICS_BYTES} "
+                "bytes; expected fewer detections in each frame",
                 "BadDiagnostics",
             )
         return diagnostics
@@ -83,7 +83,7 @@ def read_diagnostics(value: Any, field: str) -> Diagnostics | None:
         return None
     try:
         if not isinstance(value, Diagnostics):
-            raise NonsenseError(f"{field} = {shown(value)}; expected Diagnostics")
+            raise NonsenseError(f"{field} = {shown_foreign(value)}; expected Diagnostics")
         target = value.target_m
         return Diagnostics(
             phase=cut(str(value.phase), PHASE_CHARS),
@@ -110,7 +110,7 @@ def read_diagnostics(value: Any, field: str) -> Diagnostics | None:
 
 def _detection(value: Any, field: str) -> Detection:
     if not isinstance(value, Detection):
-        raise NonsenseError(f"{field} = {shown(value)}; expected Detection")
+        raise NonsenseError(f"{field} = {shown_foreign(value)}; expected Detection")
     return Detection(
         marker_id=_whole(value.marker_id, f"{field}.marker_id"),
         confidence=number(value.confidence, f"{field}.confidence"),
@@ -133,7 +133,7 @@ def _thinned(path: list[Vector]) -> tuple[Vector, ...]:
 def _items(value: object, field: str, most: int) -> list[Any]:
     found = items(value, most)
     if found is None:
-        raise NonsenseError(f"{field} = {shown(value)}; expected a sequence")
+        raise NonsenseError(f"{field} = {shown_foreign(value)}; expected a sequence")
     if len(found) > most:
         raise NonsenseError(f"{field} has more than {most} items; expected at most {most}")
     return found
@@ -142,7 +142,7 @@ def _items(value: object, field: str, most: int) -> list[Any]:
 def _whole(value: object, field: str) -> int:
     found = finite(value)
     if found is None or found != int(found) or abs(found) >= MOST_MARKER_ID:
-        raise NonsenseError(f"{field} = {shown(value)}; expected a whole number")
+        raise NonsenseError(f"{field} = {shown_foreign(value)}; expected a whole number")
     return int(found)
 
 

@@ -104,7 +104,7 @@ def observe(
         velocity_mps=_frozen(np.array(velocity_mps) + VELOCITY_NOISE_MPS * noise[3:]),
         attitude=_frozen(np.array(attitude)),
         image=_NOT_PAINTED,
-        depth_m=_frozen(frame.measured_m),
+        depth_m=_frozen(frame.measured_depth_m),
         rangefinder_m=rangefinder_m,
     )
     object.__setattr__(observation, "_paint", lambda: _frozen(frame.image))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.foreign_text import shown
+from pytest_garl.foreign_text import shown_foreign
 
 Vector = tuple[float, float, float]
 
@@ -27,10 +27,10 @@ def number(
     """Return a finite Python float from ``low`` to ``high``, or raise NonsenseError."""
     found = finite(value)
     if found is None:
-        raise NonsenseError(f"{field} = {shown(value)}; expected a finite number")
+        raise NonsenseError(f"{field} = {shown_foreign(value)}; expected a finite number")
     if not low <= found <= high:
         raise NonsenseError(
-            f"{field} = {shown(value)}; expected {low:g} to {high:g} {unit}".rstrip()
+            f"{field} = {shown_foreign(value)}; expected {low:g} to {high:g} {unit}".rstrip()
         )
     return found
 
@@ -41,12 +41,11 @@ def numbers(
     """Return ``count`` finite Python floats of any sequence, none beyond ``most`` or ``-most``."""
     found = [finite(item) for item in items(value, count) or ()]
     if len(found) != count or None in found:
-        raise NonsenseError(f"{field} = {shown(value)}; expected {count} finite numbers")
+        raise NonsenseError(f"{field} = {shown_foreign(value)}; expected {count} finite numbers")
     plain = tuple(item for item in found if item is not None)
     if any(abs(item) > most for item in plain):
-        raise NonsenseError(
-            f"{field} = {shown(plain)}; expected each from {-most:g} to {most:g} {unit}".rstrip()
-        )
+        expected = f"expected each from {-most:g} to {most:g} {unit}".rstrip()
+        raise NonsenseError(f"{field} = {shown_foreign(plain)}; {expected}")
     return plain
 
 

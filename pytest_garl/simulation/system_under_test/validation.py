@@ -20,7 +20,7 @@ from pytest_garl.commands import (
     PositionSetpoint,
     VelocitySetpoint,
 )
-from pytest_garl.foreign_text import shown
+from pytest_garl.foreign_text import shown_foreign
 from pytest_garl.landing_system import MotorThrusts
 from pytest_garl.simulation.system_under_test.diagnostics import DiagnosticsQuota, read_diagnostics
 from pytest_garl.simulation.system_under_test.reading import NonsenseError, number, numbers, vector
@@ -50,7 +50,7 @@ def read_command(answer: Any, quota: DiagnosticsQuota) -> Command:
         )
     if kind is None:
         names = ", ".join(kind.__name__ for kind in COMMANDS)
-        raise NonsenseError(f"step returned {shown(answer)}; expected one of {names}")
+        raise NonsenseError(f"step returned {shown_foreign(answer)}; expected one of {names}")
     at = f"step returned {kind.__name__} with "
     diagnostics = read_diagnostics(answer.diagnostics, f"{at}diagnostics")
     if diagnostics is not None:
@@ -92,7 +92,7 @@ def read_command(answer: Any, quota: DiagnosticsQuota) -> Command:
 def read_thrusts(answer: Any, max_thrust_n: float) -> _Thrusts:
     """Return the answer of ``control`` as plain floats, or raise NonsenseError."""
     if not isinstance(answer, MotorThrusts):
-        raise NonsenseError(f"control returned {shown(answer)}; expected MotorThrusts")
+        raise NonsenseError(f"control returned {shown_foreign(answer)}; expected MotorThrusts")
     values, most = answer.newtons, MAX_THRUST_FACTOR * max_thrust_n
     # The usual case, 240 times a second; what is not finite fails the comparison.
     if (
@@ -115,7 +115,7 @@ def _speed(answer: Any, at: str) -> float:
     value = answer.speed_mps
     found = number(value, f"{at}speed_mps", 0.0, MAX_SPEED_MPS, "m/s")
     if found == 0:
-        raise NonsenseError(f"{at}speed_mps = {shown(value)}; expected more than 0 m/s")
+        raise NonsenseError(f"{at}speed_mps = {shown_foreign(value)}; expected more than 0 m/s")
     return found
 
 
@@ -124,7 +124,7 @@ def _quaternion(value: object, field: str) -> tuple[float, float, float, float]:
     length = math.hypot(x, y, z, w)
     if not abs(length - 1) <= QUATERNION_SLACK:
         raise NonsenseError(
-            f"{field} = {shown((x, y, z, w))}, of length {length:.3g}; "
+            f"{field} = {shown_foreign((x, y, z, w))}, of length {length:.3g}; "
             "expected a unit quaternion x, y, z, w"
         )
     return x / length, y / length, z / length, w / length

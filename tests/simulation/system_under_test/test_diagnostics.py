@@ -58,7 +58,7 @@ def fill(quota: DiagnosticsQuota, steps: list[dict[str, Any]]) -> None:
 
 
 def test_flood_of_diagnostics_is_recorded_in_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(diagnostics, "MOST_BYTES", 2_400_000)
+    monkeypatch.setattr(diagnostics, "MAX_DIAGNOSTICS_BYTES", 2_400_000)
     steps: list[dict[str, Any]] = []
     with pytest.raises(NonsenseError, match="fill more than 2400000 bytes") as refused:
         fill(DiagnosticsQuota(), steps)
@@ -73,7 +73,9 @@ def test_the_recorder_keeps_all_that_verdicts_need_at_the_highest_rate(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A tenth of the longest flight at 240 Hz in a tenth of the quota."""
-    monkeypatch.setattr(diagnostics, "MOST_BYTES", diagnostics.MOST_BYTES // 10)
+    monkeypatch.setattr(
+        diagnostics, "MAX_DIAGNOSTICS_BYTES", diagnostics.MAX_DIAGNOSTICS_BYTES // 10
+    )
     quota = DiagnosticsQuota()
     for _ in range(12 * 240):
         command = read_command(rich_landing(2, characters=60), quota)
