@@ -97,9 +97,7 @@ class Columns:
         if not npcs:
             return NOBODY
         # An NPC without a grade is moved by a policy that knows of the UAV.
-        grades = [
-            row[gene.grade_column] if gene.grade_column >= 0 else len(GRADES) for gene in npcs
-        ]
+        grades = [row[npc.grade_column] if npc.grade_column >= 0 else len(GRADES) for npc in npcs]
         return CARELESS if max(grades) < 1 else INTERFERING
 
     def harshness(self, values: Matrix, gene: OptionalGene) -> float:

@@ -60,12 +60,11 @@ class Exploration:
         active = [gene for gene in columns.optional if gene.name in names]
         for gene in active:
             row[gene.values] = self.values(gene, row, rng)
-            if gene.is_npc and gene.grade_column >= 0:
-                low, high = (
-                    (0.0, 1.0) if stratum == CARELESS else (1.0, columns.upper[gene.grade_column])
-                )
-                top = np.nextafter(min(high, columns.upper[gene.grade_column]), low)
-                row[gene.grade_column] = rng.uniform(low, top) if top > low else low
+            column = gene.grade_column
+            if gene.is_npc and column >= 0:
+                low, high = (0.0, 1.0) if stratum == CARELESS else (1.0, columns.upper[column])
+                top = np.nextafter(min(high, columns.upper[column]), low)
+                row[column] = rng.uniform(low, top) if top > low else low
         self.let_coincide(row, active, rng)
         return row
 
@@ -138,11 +137,9 @@ class Exploration:
                 continue
             begin = row[first.begins_column] - self._lasts(second, row)
             end = row[first.begins_column] + self._lasts(first, row)
-            low, high = (
-                self._columns.lower[second.begins_column],
-                self._columns.upper[second.begins_column],
-            )
-            row[second.begins_column] = np.clip(rng.uniform(begin, end), low, high)
+            column = second.begins_column
+            low, high = self._columns.lower[column], self._columns.upper[column]
+            row[column] = np.clip(rng.uniform(begin, end), low, high)
 
     def _lasts(self, gene: OptionalGene, row: Matrix) -> float:
         return float(row[gene.lasts_column]) if gene.lasts_column >= 0 else 0.0
