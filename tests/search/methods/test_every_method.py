@@ -17,6 +17,12 @@ def test_a_method_depends_on_its_plan_and_results_alone(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", method_names())
+def test_a_method_says_whether_it_learns_and_overlaps(name: str) -> None:
+    method = make_method(name, plan())
+    assert {type(method.learns), type(method.overlaps)} == {bool}
+
+
+@pytest.mark.parametrize("name", method_names())
 def test_every_scenario_is_valid_and_new(name: str) -> None:
     scenarios = [each for made in bred(make_method(name, plan()), 12) for each in made]
     assert not [found for each in scenarios for found in problems(each, MAP)]
