@@ -95,13 +95,6 @@ class LedgerQueries:
         """Return the flights of all searches in slot order, or those of one search."""
         return self._flights("? IN ('', search.id)", search)
 
-    def count_flights(self, search: str) -> int:
-        """Return the number of flights of a search that have a result."""
-        row = self._database.execute(
-            "SELECT count(*) FROM slot WHERE search = ? AND state = 'flown'", (search,)
-        ).fetchone()
-        return int(row[0])
-
     def wanted(self, search: str) -> int:
         """Return the number of flights of a search, those that have not been bred included."""
         row = self._database.execute("SELECT wanted FROM search WHERE id = ?", (search,)).fetchone()

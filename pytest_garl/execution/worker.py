@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+import gc
 import importlib
 import traceback
 from collections.abc import Callable
 from contextlib import closing
-from gc import collect, freeze
 from os import _exit, getpid, getppid
 from pathlib import Path
 from resource import getpagesize
@@ -158,7 +158,7 @@ class Worker:
         cpu_dispatch.check()
         state = ProcessState()
         # What is there by now stays, so that to collect what a flight leaves takes milliseconds.
-        freeze()
+        gc.freeze()
         while (claim := self._wait_for_slot()) is not None:
             try:
                 flown = self._fly(claim)
@@ -252,7 +252,7 @@ def give_back_memory() -> None:
     collect some flights later.  The C library keeps freed pages between those in use, and the
     next flight uses them: to get them anew takes 3 % of a flight, so most flights leave them.
     """
-    collect()
+    gc.collect()
     if _TRIM is not None and _resident_bytes() > MOST_KEPT_BYTES:
         _TRIM(0)
 

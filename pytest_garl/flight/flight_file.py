@@ -133,6 +133,7 @@ def save(flight: Flight, path: Path) -> None:
 
 def _fields(value: Any) -> dict[str, Any]:
     """Return the fields of a dataclass; ``dataclasses.asdict`` would copy each of their values."""
+    # For mypy a class cannot be hashed, though each can.
     return {name: getattr(value, name) for name in _names(type(value))}  # type: ignore[arg-type]
 
 

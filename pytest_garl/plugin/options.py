@@ -98,7 +98,7 @@ class Options:
     def domain_of(self, named: str | None) -> Domain:
         """Return the domain of a test whose marker names one; the command line wins.
 
-        Raises ScenarioError for a domain that cannot be read, be it flown or not.
+        Raises ScenarioError for a domain that cannot be read, also if nothing is flown in it.
         """
         if named is None:
             return self.domain

@@ -96,8 +96,8 @@ def compare_runs(before: RunRecord, after: RunRecord) -> RunComparison:
 def _pairs(before: RunRecord, after: RunRecord) -> list[Pair]:
     """Return the searches side by side.
 
-    The only search of a landing system on a map has the place of the other run's only one, be it in
-    another domain; of several each has that of the same domain and tests.
+    If each run has one search of a landing system on a map, these are a pair, also if their domains
+    differ.  Otherwise two searches of the same domain and tests are a pair.
     """
     both = before.searches, after.searches
     by_place: dict[tuple[str, str], tuple[list[SearchRecord], list[SearchRecord]]] = {}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from importlib.metadata import version
@@ -13,7 +12,7 @@ from types import MappingProxyType
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.corpus import Corpus
 from pytest_garl.errors import LedgerError
-from pytest_garl.execution.facts import FailedFlightAssertion, SearchKey, search_names
+from pytest_garl.execution.facts import Facts, SearchKey, search_names
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
@@ -96,34 +95,24 @@ def _searches(ledger: Ledger, jobs: dict[str, FlightJob]) -> list[SearchRecord]:
     wanted: Counter[SearchKey] = Counter()
     for each in ledger.queries.progress():
         wanted[noted.get(each.search, SearchKey(system=each.system, map=each.map))] += each.total
-    failures = ledger.facts.user_failures
-    method = ledger.facts.method
     found = []
     for key, flights in sorted(flown.items()):
         ids = dict.fromkeys(each.id.search for each in flights)
-        jobs |= {search: parse_job(ledger.job(search) or "") for search in ids}
-        limits = dict.fromkeys(jobs[search].limits for search in ids)
-        npcs = dict.fromkeys(jobs[search].npcs.name for search in ids)
-        search = _search(key, flights, [each for each in failures if each.search in ids], method)
-        found.append(
-            dataclasses.replace(
-                search,
-                name=names[key],
-                wanted=wanted[key],
-                limits=tuple(limits),
-                npcs=tuple(npcs),
-                camera=ledger.facts.camera(key.system),
-            )
-        )
+        own = {search: parse_job(ledger.job(search) or "") for search in ids}
+        jobs |= own
+        found.append(_search(ledger.facts, key, names[key], wanted[key], flights, own))
     return found
 
 
 def _search(
+    facts: Facts,
     key: SearchKey,
+    name: str,
+    wanted: int,
     flights: Sequence[LedgerFlight],
-    user_failures: Iterable[FailedFlightAssertion],
-    method: str | None,
+    jobs: Mapping[str, FlightJob],
 ) -> SearchRecord:
+    """Return a search with these flights, and the jobs of them by their key in the ledger."""
     # (slot, story) of all violations, by signature.
     violations: dict[str, list[tuple[str, str]]] = {}
     findings: dict[str, list[tuple[str, str]]] = {}
@@ -133,19 +122,25 @@ def _search(
             violations.setdefault(verdict.ending, []).append((slot, verdict.story))
         for finding in verdict.findings:
             findings.setdefault(finding.signature, []).append((slot, finding.story))
-    for each in sorted(user_failures, key=lambda each: each.slot):
-        violations.setdefault(each.signature, []).append((each.slot, each.message))
+    for each in sorted(facts.user_failures, key=lambda each: each.slot):
+        if each.search in jobs:
+            violations.setdefault(each.signature, []).append((each.slot, each.message))
+    method = facts.method
     control = control_arm(method, flights)
     random = {f.id.slot_id for f in flights if is_control(method, f.id.slot.generation)}
     compares = control is not None and control.later.flights > 0
     return SearchRecord(
         key=key,
-        name=key.place,
+        name=name,
         flights=tuple(flights),
         kinds=kinds_of(violations, _lowest_severities(flights), random if compares else None),
         violating=len({slot for items in violations.values() for slot, _ in items}),
+        wanted=wanted,
         findings=kinds_of(findings),
+        limits=tuple(dict.fromkeys(each.limits for each in jobs.values())),
+        npcs=tuple(dict.fromkeys(each.npcs.name for each in jobs.values())),
         control=control,
+        camera=facts.camera(key.system),
     )
 
 

@@ -222,7 +222,7 @@ class SearchRecord:
 
     @property
     def tenth_violation(self) -> int | None:
-        """The flight with the tenth violation by the paper's definition; None if there are less."""
+        """The flight with the tenth violation by the paper's definition; None with fewer."""
         return top_k(self.verdicts)
 
     @property
@@ -242,7 +242,7 @@ class SearchRecord:
 
     @property
     def completed_well(self) -> int:
-        """How many of these violate no property built in."""
+        """How many of those that are ``completed`` violate no property built in."""
         return sum(verdict.completed and not verdict.violation for verdict in self.verdicts)
 
     @property
