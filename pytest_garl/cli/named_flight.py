@@ -24,8 +24,8 @@ from pytest_garl.messages import command, shortened
 from pytest_garl.reports.films import NO_RECORD, camera_of, recorded_flight, why_no_camera
 from pytest_garl.reports.html.flight_task import FlightTask, flight_record_of
 from pytest_garl.reports.mcap.export import Export, Place
+from pytest_garl.scenarios.files import dump_scenario, parse_scenario
 from pytest_garl.scenarios.files import load as load_scenario
-from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.verdicts.judge import judge
@@ -133,7 +133,7 @@ class FlightName:
 
     def _recorded_case(self, case: Case) -> tuple[NamedFlight | None, str]:
         """Return the flight that a case describes if a ledger has its record, or why not."""
-        task = self._with_hash(case.evidence.trajectory_sha256, LEDGER.parent)
+        task = self._with_hash(case.evidence.trajectory_sha256, LEDGER.parent, case)
         if task is None or task.job.system.name != case.system:
             return None, f"no record of its flight at {self.ledger or LEDGER}"
         flight, missing = flight_record_of(task)
@@ -179,8 +179,13 @@ class FlightName:
             notes=("The limits of its test are not known: the default ones judge it.",),
         )
 
-    def _with_hash(self, sha256: str, run: Path) -> FlightTask | None:
-        """Return the flight with this trajectory in the ledger that is given, or in those near."""
+    def _with_hash(self, sha256: str, run: Path, case: Case | None = None) -> FlightTask | None:
+        """Return the flight with this trajectory in the ledger that is given, or in those near.
+
+        It is that of ``case`` if several have the trajectory.
+        """
+        scenario = dump_scenario(case.scenario) if case else ""
+        signature = case.violation.signature if case else ""
         if self.ledger is not None and not self.ledger.is_file():
             raise _no_ledger(self.ledger)
         near = {
@@ -193,7 +198,9 @@ class FlightName:
                 continue
             try:
                 with checked_ledger(path) as opened:
-                    known = opened.queries.flight_with_hash(sha256)
+                    known = opened.queries.flight_with_hash(
+                        sha256, scenario=scenario, signature=signature
+                    )
                     if known is not None:
                         return recorded_flight(opened, known)
             except LedgerError as error:

@@ -137,10 +137,21 @@ class LedgerQueries:
         """Return the first flight, in slot order, of those that end with a signature so far."""
         return next(each for each in self.violating(search) if each.signature == signature)
 
-    def flight_with_hash(self, sha256: str) -> LedgerFlight | None:
-        """Return a flight whose trajectory has a hash: of a search, or flown on demand."""
+    def flight_with_hash(
+        self, sha256: str, *, scenario: str = "", signature: str = ""
+    ) -> LedgerFlight | None:
+        """Return a flight whose trajectory has a hash: of a search, or flown on demand.
+
+        Several flights may have one trajectory: a UAV that waits for a marker flies alike in fog
+        and in dust.  So it is the flight of ``scenario``, else one that ends as ``signature`` says.
+        A failed assertion of a user's own is in no flight's result, so any flight may have it.
+        """
+        if not sha256:
+            return None
         found = self._flights("slot.sha256 = ?", sha256, kinds="'search', 'case', 'on_demand'")
-        return found[0] if sha256 and found else None
+        ending = "" if signature.startswith("own:") else ending_of(signature)
+        alike = [each for each in found if not ending or ending_of(each.signature) == ending]
+        return next((each for each in found if each.scenario == scenario), next(iter(alike), None))
 
     def _flights(
         self, condition: str, *values: str | int | None, kinds: str = "'search'"

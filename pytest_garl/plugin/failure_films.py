@@ -111,7 +111,8 @@ def _failed_cases(reporter: Any, run: Run) -> Iterator[_Failure]:
         if not name.startswith("case-") or name in seen:
             continue
         seen.add(name)
-        flight = run.ledger.queries.flight_with_hash(record.trajectory_sha256 or "")
+        sha256, signature = record.trajectory_sha256 or "", record.signature or ""
+        flight = run.ledger.queries.flight_with_hash(sha256, signature=signature)
         if flight is not None:
             yield _Failure(key=(name,), name=name, flight=flight)
 

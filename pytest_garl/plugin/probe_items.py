@@ -223,7 +223,7 @@ def probe_requests(ledger: Ledger, budget: int) -> tuple[CaseRequest, ...]:
     requests: dict[str, CaseRequest] = {}
     for search, _ in ledger.searches():
         for signature, sha256 in ledger.facts.violated_probes(search):
-            flight = ledger.queries.flight_with_hash(sha256)
+            flight = ledger.queries.flight_with_hash(sha256, signature=signature)
             job = ledger.job(flight.id.search) if flight is not None else None
             if flight is None or job is None:
                 continue

@@ -28,6 +28,7 @@ from pytest_garl.reports.run_record import (
     SearchRecord,
     place_of,
 )
+from pytest_garl.scenarios.files import dump_scenario
 
 _NONE: Mapping[str, tuple[Severity, str]] = MappingProxyType({})
 
@@ -159,7 +160,11 @@ def _saved_cases(
             continue
         flight = None
         if place_of(case) in endings:
-            flight = ledger.queries.flight_with_hash(case.evidence.trajectory_sha256)
+            flight = ledger.queries.flight_with_hash(
+                case.evidence.trajectory_sha256,
+                scenario=dump_scenario(case.scenario),
+                signature=case.violation.signature,
+            )
         if flight is not None:
             jobs[flight.id.search] = parse_job(ledger.job(flight.id.search) or "")
         known = corpus.is_accepted(entry)

@@ -181,7 +181,7 @@ def test_a_saved_case_is_drawn_from_the_record_that_the_ledger_has(
     file = replace_file(case, dataclasses.replace(saved, evidence=evidence))
     assert "flown again" in drawn(file, "-o", "it.mp4"), "of another system"
     shutil.rmtree(".garl")
-    flown = [Flown(result=lost(), flight=video.flight)]
+    flown = [Flown(result=lost(signature=saved.violation.signature), flight=video.flight)]
     write_ledger(Path.cwd(), flown, system=saved.system)
     assert drawn(file, "-o", "it.mp4").startswith("it.mp4: 3.0 s")
     shutil.rmtree(".garl/flights")

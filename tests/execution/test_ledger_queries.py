@@ -74,6 +74,26 @@ def test_flights_are_those_with_a_result_in_slot_order(tmp_path: Path) -> None:
     assert done.record == flights[1].id.record(tmp_path)
 
 
+def test_flight_with_a_shared_trajectory_is_that_of_the_scenario_or_of_the_signature(
+    tmp_path: Path,
+) -> None:
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    for signature in ("II:gave-up-in-sight:approach", "II:never-seen", "II:never-seen"):
+        claim = ledger.queue.claim()
+        assert claim is not None
+        ledger.queue.record(claim, flight_result(signature), "ab", 0.1)
+
+    def found(**wanted: str) -> str | None:
+        flight = ledger.queries.flight_with_hash("ab", **wanted)
+        return flight.scenario if flight else None
+
+    assert found(scenario="c", signature="II:never-seen") == "c"
+    assert found(scenario="without what it never read", signature="II:never-seen") == "b"
+    assert found(signature="own:test_it") == found() == "a"
+    assert found(signature="IV:dog") is None
+    assert ledger.queries.flight_with_hash("") is None
+
+
 def test_generations_are_closed_in_order(tmp_path: Path) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
     ledger.add_slots("s", 1, {0: "d"})
