@@ -7,9 +7,14 @@ import subprocess
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 
 from tests.support.other_plugins import FASTER
 from tests.support.warm_python import WarmPopen
+
+# A machine with other work is slow: no test asserts how long an example takes.
+settings.register_profile("without deadlines", deadline=None)
+settings.load_profile("without deadlines")
 
 
 @pytest.fixture(scope="session", autouse=True)

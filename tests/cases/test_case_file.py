@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_garl.cases.case import (
@@ -63,7 +63,6 @@ def test_file_keeps_what_was_preventable(answer: Preventable, observed_s: float 
     assert ('escape = "motors off"' in text) is (escape == "motors off")
 
 
-@settings(deadline=None)
 @given(st.text())
 def test_file_keeps_any_description(description: str) -> None:
     strange = case(description=description)

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_garl.errors import BaselineError, ScenarioError
@@ -46,7 +46,6 @@ def test_the_file_has_one_line_per_flight_and_names_its_genes_once() -> None:
     assert len(text) < 20 * 550 + 2500
 
 
-@settings(deadline=None)
 @given(st.text(), st.text())
 def test_any_signature_survives_the_file(signature: str, name: str) -> None:
     strange = FlightSummary(outcome="crashed", signature=signature)

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_garl.gate.comparison import compare
@@ -37,7 +37,6 @@ def test_mcnemar_p_is_the_tail_of_the_discordant_pairs(broke: int, fixed: int, p
     assert mcnemar_p(broke, fixed) == p
 
 
-@settings(deadline=None)
 @given(st.integers(0, 300), st.integers(0, 300))
 def test_mcnemar_p_agrees_with_scipy(broke: int, fixed: int) -> None:
     from scipy.stats import binomtest

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_garl.gate import gate_statistics
@@ -46,7 +46,6 @@ def enumerated_p(differences: Sequence[float]) -> float:
     return float(np.mean([np.dot(sign, ranks) >= observed - 1e-9 for sign in signs]))
 
 
-@settings(deadline=None)
 @given(st.lists(st.integers(-4, 4), min_size=1, max_size=9))
 def test_signed_rank_p_with_ties_agrees_with_all_signs(differences: list[int]) -> None:
     assert signed_rank_p(differences) == pytest.approx(enumerated_p(differences), rel=1e-9)

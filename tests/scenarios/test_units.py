@@ -53,7 +53,7 @@ def any_scenario(draw: st.DrawFn, map: Map) -> Scenario:
 
 @pytest.mark.parametrize("name", map_names())
 @given(data=st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_a_file_gives_back_every_repaired_scenario(name: str, data: st.DataObject) -> None:
     map = load_map(name)
     scenario = repair(data.draw(any_scenario(map)), map)
@@ -66,7 +66,7 @@ def test_a_file_gives_back_every_repaired_scenario(name: str, data: st.DataObjec
 @example(position=0.0, turn_deg=-90.0)
 @example(position=0.5, turn_deg=180.0)
 @example(position=1.0, turn_deg=89.999)
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=1000)
 def test_snapping_the_sun_twice_moves_it_once(position: float, turn_deg: float) -> None:
     sun = PLAIN.replace({SUN: position, "light.turn_deg": turn_deg})
     once = snapped(sun, COURT)
@@ -74,7 +74,7 @@ def test_snapping_the_sun_twice_moves_it_once(position: float, turn_deg: float) 
 
 
 @given(angle=st.floats(-math.pi, math.pi))
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=1000)
 def test_snapping_keeps_a_marker_at_the_edge_of_its_disc_inside(angle: float) -> None:
     x, y = COURT.gps_position_m
     edge = (x + MARKER_RADIUS_M * math.cos(angle), y + MARKER_RADIUS_M * math.sin(angle))

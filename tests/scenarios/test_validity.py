@@ -18,7 +18,7 @@ COURT = load_map("court")
 
 @pytest.mark.parametrize("map", map_names())
 @given(data=st.data())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_every_drawn_scenario_is_valid_and_survives_its_file(map: str, data: st.DataObject) -> None:
     scenario = data.draw(scenarios(map))
     place = load_map(map)

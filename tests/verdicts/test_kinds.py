@@ -98,7 +98,6 @@ def test_rarefaction_is_the_mean_of_all_draws(search: tuple[list[int], int, int]
         assert kinds_in_violations(counts, drawn) == pytest.approx(sum(every) / len(every))
 
 
-@settings(deadline=None)
 @given(search=searches())
 def test_chances_of_numbers_of_kinds_are_those_of_all_draws(
     search: tuple[list[int], int, int],
@@ -109,7 +108,6 @@ def test_chances_of_numbers_of_kinds_are_those_of_all_draws(
     assert chances == pytest.approx(np.array(expected), abs=1e-12)
 
 
-@settings(deadline=None)
 @given(search=searches())
 def test_range_covers_the_draws_and_nothing_narrower_at_its_ends_does(
     search: tuple[list[int], int, int],
@@ -123,7 +121,7 @@ def test_range_covers_the_draws_and_nothing_narrower_at_its_ends_does(
     assert low <= high
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(counts=st.lists(st.integers(1, 200), min_size=1, max_size=12))
 def test_figures_of_large_searches_agree_with_each_other(counts: list[int]) -> None:
     flights = sum(counts) + 100

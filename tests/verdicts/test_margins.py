@@ -94,7 +94,7 @@ WORSE = {
 
 @pytest.mark.parametrize("what", WORSE)
 @pytest.mark.parametrize("outcome", ["landed", "slid", "gave_up", "not_landed", "collision"])
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_a_worse_flight_has_no_larger_margin(outcome: Any, what: str, data: Any) -> None:
     name, values = WORSE[what]
@@ -104,7 +104,7 @@ def test_a_worse_flight_has_no_larger_margin(outcome: Any, what: str, data: Any)
     assert after[name] <= before[name] + 1e-9
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(a=st.floats(0.0, 6.0), b=st.floats(0.0, 6.0))
 def test_a_nearer_body_has_no_larger_margin(a: float, b: float) -> None:
     near, far = sorted((a, b))
@@ -114,7 +114,7 @@ def test_a_nearer_body_has_no_larger_margin(a: float, b: float) -> None:
         assert second["collision"] <= first["collision"]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(a=st.integers(60, 120), b=st.integers(60, 120), landed=st.booleans())
 def test_a_later_flight_has_no_larger_margin(a: int, b: int, landed: bool) -> None:
     outcome = "landed" if landed else "gave_up"

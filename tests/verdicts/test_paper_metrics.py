@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
@@ -31,7 +31,6 @@ def test_parameter_distance_is_the_mean_over_all_ordered_pairs() -> None:
     assert mean_distance(np.empty((0, 2))) == 0.0
 
 
-@settings(deadline=None)
 @given(arrays(float, st.tuples(st.integers(1, 12), st.integers(1, 5)), elements=st.floats(0, 1)))
 def test_parameter_distance_is_the_mean_of_the_diversity_objective(
     scenarios: NDArray[np.float64],

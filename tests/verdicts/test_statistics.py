@@ -52,7 +52,7 @@ def test_too_many_partitions_are_approximated() -> None:
     assert [u, p] == pytest.approx([expected.statistic, expected.pvalue])
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(values, values)
 def test_p_is_the_share_of_partitions_at_least_as_extreme(
     first: list[float], second: list[float]
