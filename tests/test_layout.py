@@ -21,7 +21,7 @@ REACH = {
     "pytest_garl.verdicts.judge": 26,
     "pytest_garl.scenarios.files": 22,
     "pytest_garl.cases.case_file": 34,
-    "pytest_garl.plugin.options": 53,
+    "pytest_garl.plugin.options": 50,
 }
 """Modules of the package that an import pulls in at most, those included that it imports late."""
 MOST_FILES = 28
@@ -39,6 +39,7 @@ KEPT_APART = {
     "plugin/option_checks": "every pytest run loads the hooks, and few need the checks",
     "plugin/option_values": "reads texts; options says which option is which",
     "plugin/pages": "a run without pages does not load it",
+    "plugin/repeated": "every pytest run loads the hooks, and few repeat a scenario",
     "plugin/terminal_summary": "every pytest run loads the hooks, and few write a summary",
     "reports/film/gif": "a format of files",
     "reports/film/labels": "letters for any picture",

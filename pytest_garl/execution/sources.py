@@ -27,6 +27,8 @@ from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import Any
 
+from pytest_garl.errors import LandingSystemError
+
 _HOME = Path(__file__).resolve().parents[1]
 """The folder of pytest_garl."""
 ROOTS = (
@@ -70,13 +72,15 @@ def source_hashes(
 def data_files(paths: Sequence[str], root: Path) -> dict[str, Path]:
     """Return the files at paths below ``root`` by their names; a folder means all files in it.
 
-    Raises FileNotFoundError, with the path as its message, if there is no such path.
+    Raises LandingSystemError if there is no such path: the mark of a test names them.
     """
     found: dict[str, Path] = {}
     for path in paths:
         target = root / path
         if not target.exists():
-            raise FileNotFoundError(path)
+            raise LandingSystemError(
+                f"mark.garl: files: there is no {path!r} below {root}; expected a file or a folder"
+            )
         inside = sorted(target.rglob("*")) if target.is_dir() else [target]
         found.update((_name(file, root), file) for file in inside if file.is_file())
     return found

@@ -135,15 +135,15 @@ class BaselineGatePlugin:
             marked = read_marker(marker, self._options)
         except GarlError as error:
             raise pytest.Collector.CollectError(f"{collector.nodeid}: {error}") from error
-        for map in marked.maps:
-            base = self._baseline.find(marked.target.system_name, map)
-            gate = (str(collector.path), marked.target.system_name, map)
+        for map, target in marked.targets.items():
+            base = self._baseline.find(target.system_name, map)
+            gate = (str(collector.path), target.system_name, map)
             if base is not None and gate not in self._gates_made:
                 self._gates_made.add(gate)
                 yield BaselineGateItem.from_parent(
                     collector,
                     name=f"baseline[{base.title}]",
-                    target=marked.on(map),
+                    target=target,
                     base=base,
                 )
 

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
+from pytest_garl.cases.collected_tests import CollectedTest
+from pytest_garl.cases.corpus import Corpus, CorpusEntry
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import slots
-from pytest_garl.messages import command
-from pytest_garl.plugin.inputs import corpus_of, repeated_slot_of
-from pytest_garl.plugin.keys import COLLECTED, SLOT_FIXTURE, marker_among
+from pytest_garl.plugin.keys import COLLECTED, REPEATED, SLOT_FIXTURE, marker_among
 from pytest_garl.plugin.marker import MarkerArguments, read_marker
-from pytest_garl.plugin.options import options_of
+from pytest_garl.plugin.options import Options, options_of
 from pytest_garl.plugin.target import Target
+from pytest_garl.scenarios.maps.loading import map_names
 
+_CORPUS = pytest.StashKey[Corpus]()
 NOTHING_TO_FLY = (
     "no --garl-budget given and no saved case of this test; to search: pytest --garl-budget=40"
 )
@@ -81,90 +82,59 @@ def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark) -> None:
 
     Raises GarlError if the marker is invalid.
     """
-    options = options_of(metafunc.config)
+    config, test = metafunc.config, metafunc.definition
+    options = options_of(config)
     arguments = read_marker(marker, options)
-    _note(metafunc, arguments)
-    targets = targets_for(arguments, metafunc.config, metafunc.definition.originalname)
-    if targets:
-        ids = [target.name for target in targets]
-        return metafunc.parametrize(SLOT_FIXTURE, targets, ids=ids, indirect=True)
-    if options.repeat:
-        reason = f"--garl-repeat={options.repeat}: this test does not fly it"
-    else:
-        reason = "no map selected" if options.budget else NOTHING_TO_FLY
-    return metafunc.parametrize(SLOT_FIXTURE, [reason], ids=["nothing"], indirect=True)
-
-
-def _note(metafunc: pytest.Metafunc, arguments: MarkerArguments) -> None:
-    """Note a test for the census of the saved cases."""
-    from pytest_garl.cases.collected_tests import CollectedTest
-
-    metafunc.config.stash[COLLECTED].tests.append(
+    # The census of the saved cases asks which tests there are.
+    config.stash[COLLECTED].tests.append(
         CollectedTest(
-            nodeid=metafunc.definition.nodeid,
-            name=metafunc.definition.originalname,
+            nodeid=test.nodeid,
+            name=test.originalname,
             system=arguments.target.system_name,
-            maps=arguments.all_maps,
+            maps=arguments.maps,
             data_files=arguments.target.files,
         )
     )
-
-
-def targets_for(arguments: MarkerArguments, config: pytest.Config, test: str) -> list[Target]:
-    """Return the saved cases and the slots of a marked test called ``test``."""
-    options = options_of(config)
     if options.repeat:
-        return [
-            each for map in arguments.maps for each in _repeated_targets(arguments, map, config)
+        targets = config.stash[REPEATED].targets(arguments.targets)
+        reason = f"--garl-repeat={options.repeat}: this test does not fly it"
+    else:
+        entries = corpus_of(config, options).entries(arguments.target.system_name)
+        known_maps = map_names(options.map_folders)
+        searched = slots(options.budget, options.population)
+        targets = [
+            *_saved_targets(entries, arguments, known_maps, test.originalname),
+            *(replace(each, slot=slot) for each in arguments.targets.values() for slot in searched),
         ]
-    searched = [
-        replace(target, slot=slot)
-        for target in [arguments.on(map) for map in arguments.maps]
-        for slot in slots(options.budget, options.population)
-    ]
-    return [*_saved_targets(arguments, config, test), *searched]
+        reason = "no map selected" if options.budget else NOTHING_TO_FLY
+    ids = [target.name for target in targets]
+    metafunc.parametrize(SLOT_FIXTURE, targets or [reason], ids=ids or ["nothing"], indirect=True)
 
 
 def _saved_targets(
-    arguments: MarkerArguments, config: pytest.Config, test: str
+    entries: Iterable[CorpusEntry],
+    arguments: MarkerArguments,
+    known_maps: Collection[str],
+    test: str,
 ) -> Iterator[Target]:
-    options = options_of(config)
-    if not options.cases.is_dir() and not options.cases.is_symlink():
-        return
-    from pytest_garl.scenarios.maps.loading import map_names
+    """Yield what a test called ``test`` flies of its system's saved cases.
 
-    known_maps = map_names(options.map_folders)
-    for entry in corpus_of(config).entries(arguments.target.system_name):
+    A case that cannot be read, or that lies on a map that there is no more, is flown by every test
+    of the system, and fails.
+    """
+    for entry in entries:
         header = entry.header
         if header is None or header.map not in known_maps:
             yield replace(arguments.target, entry=entry)
-            continue
-        if header.map not in arguments.maps or header.asserting_test not in ("", test):
-            continue
-        target = replace(arguments.on(header.map), entry=entry)
-        yield target
-        if header.status == "fixed" and header.live:
-            yield replace(target, live=True)
+        elif header.map in arguments.targets and header.asserting_test in ("", test):
+            target = replace(arguments.targets[header.map], entry=entry)
+            yield target
+            if header.status == "fixed" and header.live:
+                yield replace(target, live=True)
 
 
-def _repeated_targets(arguments: MarkerArguments, map: str, config: pytest.Config) -> list[Target]:
-    options = options_of(config)
-    if Path(options.repeat).is_file():
-        from pytest_garl.files.toml import parse
-        from pytest_garl.scenarios.files import map_name_in
-
-        text = Path(options.repeat).read_text(encoding="utf-8")
-        if "violation" in parse(text, options.repeat):
-            replay = command("garl", "cases", "replay", options.repeat)
-            raise GarlError(
-                f"--garl-repeat={options.repeat}: found a saved case, expected a slot or a file "
-                f"with a scenario; cases are flown by: {replay}"
-            )
-        if map_name_in(text, source=options.repeat) != map:
-            return []
-        return [replace(arguments.on(map), file=options.repeat)]
-    stored = repeated_slot_of(config)
-    if stored is None or stored.map != map:
-        return []
-    target = replace(arguments.on(map), slot=stored.slot, stored=stored)
-    return [target] if target.stored_flight else []
+def corpus_of(config: pytest.Config, options: Options) -> Corpus:
+    """Return the session's saved cases, one object that reads each of them once."""
+    if _CORPUS not in config.stash:
+        config.stash[_CORPUS] = Corpus(options.cases, options.map_folders)
+    return config.stash[_CORPUS]

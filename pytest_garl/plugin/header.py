@@ -55,14 +55,14 @@ def domain_lines(run: Run) -> list[str]:
     given = dict.fromkeys(
         (target.system.__qualname__, target.domain, target.navigation)
         for target in targets
-        if target.entry is None and target.domain is not None
+        if target.entry is None
     )
     lines = []
     for name, domain, navigation in given:
-        if domain is not None and domain != run.options.domain:
+        if domain != run.options.domain:
             npcs = run.options.policy_in(domain)
             lines.append(f"garl: domain of {name}: {domain.name}, NPCs {npcs}")
-        if domain is not None and domain != within(domain, navigation):
+        if domain != within(domain, navigation):
             lines.append(f"garl: navigation of {name}: {navigation}, which bounds the domain's")
     return list(dict.fromkeys(lines))
 

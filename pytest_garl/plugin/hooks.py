@@ -24,6 +24,7 @@ from pytest_garl.plugin.keys import (
     COLLECTED,
     GATE_PLUGIN,
     LANDING,
+    REPEATED,
     RUN,
     TALLY,
     closest_mark,
@@ -93,10 +94,10 @@ def pytest_configure(config: pytest.Config) -> None:
     options = options_of(config)
     check_usage(options)
     if options.repeat:
-        from pytest_garl.plugin.inputs import repeated_slot_of
+        from pytest_garl.plugin.repeated import read_repeated
 
-        # An earlier search that cannot be read ends the session before anything is flown.
-        repeated_slot_of(config)
+        # What cannot be read ends the session before anything is collected or flown.
+        config.stash[REPEATED] = read_repeated(options)
     if options.baseline is not None:
         from pytest_garl.plugin.baseline_gate import register
 

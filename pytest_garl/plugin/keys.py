@@ -21,6 +21,8 @@ COLLECTED = pytest.StashKey[Any]()
 """Where a session keeps which files and landing tests it collected."""
 LANDING = pytest.StashKey[Any]()
 """Where an item keeps the landing that it asked for."""
+REPEATED = pytest.StashKey[Any]()
+"""Where a session keeps the scenario that ``--garl-repeat`` names; none without it."""
 BODY_RUNS = pytest.StashKey[bool]()
 """Where an item keeps whether the test's body runs."""
 GATE_PLUGIN = "garl_baseline_gate"

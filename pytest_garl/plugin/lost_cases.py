@@ -75,9 +75,9 @@ def lost_case_items(
     if missing:
         return [_item(session, options.cases, missing)]
     from pytest_garl.cases.census import census
-    from pytest_garl.plugin.inputs import corpus_of
+    from pytest_garl.plugin.collection import corpus_of
 
-    lost = census(corpus_of(config), project_of(config, options, collected))
+    lost = census(corpus_of(config, options), project_of(config, options, collected))
     return [_item(session, each.path, each.reason) for each in lost]
 
 

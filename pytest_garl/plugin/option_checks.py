@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import pytest
 
+from pytest_garl.errors import GarlError
 from pytest_garl.plugin.keys import is_landing_item, takes_landing
 from pytest_garl.plugin.options import Options
 
@@ -27,7 +28,7 @@ def check_usage(options: Options) -> None:
 
     A value of an ini key applies to all runs and may have no effect on some.
     """
-    for problem in (*_without_effect(options), *_unknown_maps(options)):
+    for problem in (*_without_effect(options), *_unknown_maps(options), *_no_report(options)):
         raise pytest.UsageError(problem)
 
 
@@ -73,6 +74,17 @@ def _without_effect(options: Options) -> Iterator[str]:
         yield "--garl-report-url has no effect without --garl-report, whose address it is"
     if "level" in given and options.baseline is None:
         yield "--garl-level has no effect without --garl-baseline: only that gate uses it"
+
+
+def _no_report(options: Options) -> Iterator[str]:
+    """Yield why a report cannot be written: a search of hours shall not end without it."""
+    if options.report is not None:
+        from pytest_garl.reports.html.folder import check_target
+
+        try:
+            check_target(options.report)
+        except GarlError as error:
+            yield f"--garl-report: {error}"
 
 
 def _unknown_maps(options: Options) -> Iterator[str]:

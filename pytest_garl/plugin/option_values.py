@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import urllib.parse
-from pathlib import Path
 from typing import Literal, cast
 
 import pytest
@@ -61,26 +60,6 @@ def filmed(text: str, *, draws: bool) -> Literal["", "failures"]:
         except GarlError as error:
             raise pytest.UsageError(f"--garl-film={text}: {error}") from error
     return cast(Literal["failures"], text)
-
-
-def report_folder(config: pytest.Config) -> Path | None:
-    """Return the folder: the command line's as seen from here, the ini key's from the root.
-
-    It is checked at once: a search of hours shall not end without its report.
-    """
-    given = config.getoption("--garl-report")
-    text, folder = str(given or ""), Path()
-    if not text:
-        text, folder = str(config.getini("garl_report")), config.rootpath
-    if not text:
-        return None
-    from pytest_garl.reports.html.folder import check_target
-
-    try:
-        check_target(folder / text)
-    except GarlError as error:
-        raise pytest.UsageError(f"--garl-report: {error}") from error
-    return folder / text
 
 
 def report_url(text: str) -> str:

@@ -6,7 +6,7 @@ import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import pytest
 
@@ -19,11 +19,10 @@ from pytest_garl.plugin.option_values import (
     filmed,
     integer,
     number,
-    report_folder,
     report_url,
     wrong,
 )
-from pytest_garl.plugin.xdist import CONTROLLER, SEED, given_by_controller, is_xdist_worker
+from pytest_garl.plugin.xdist import CONTROLLER, SEED, is_xdist_worker
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.search.method_catalogue import default_policy, find_method, method_names
 
@@ -95,16 +94,6 @@ class Options:
         """Whether the session flies a search or a repeated scenario, and not saved cases only."""
         return self.budget > 0 or bool(self.repeat)
 
-    def domain_of(self, named: str | None) -> Domain:
-        """Return the domain of a test whose marker names one; the command line wins.
-
-        Raises ScenarioError for a domain that cannot be read, also if nothing is flown in it.
-        """
-        if named is None:
-            return self.domain
-        own = domain_with_policy(named, self.root)
-        return self.domain if "domain" in self.given else own
-
     def policy_in(self, domain: Domain) -> str:
         """Return the name of the policy that moves the NPCs of a search in a domain."""
         return self.npcs or policy_in(domain, default_policy(self.method))
@@ -141,6 +130,7 @@ def options_of(config: pytest.Config) -> Options:
 def read_options(config: pytest.Config) -> Options:
     """Read the options; call ``options_of``, which does it once."""
     text = {option.name: _value(config, option) for option in OPTIONS}
+    of_controller = getattr(config, "workerinput", {})
     budget = integer("budget", text["budget"], 1) if text["budget"] else 0
     size = integer("population", text["population"], 1) if text["population"] else 0
     address = os.environ.get("RAY_ADDRESS", "")
@@ -151,13 +141,12 @@ def read_options(config: pytest.Config) -> Options:
         budget=budget,
         population=min(size, budget) if size else population(budget),
         resume=bool(config.getoption("--garl-resume")),
-        seed=_seed(config, text["seed"]),
+        seed=int(of_controller[SEED]) if SEED in of_controller else _seed(text["seed"]),
         method=_method(text["method"]),
         maps=tuple(part.strip() for part in text["map"].split(",") if part.strip()),
         pool=cast(Literal["local", "ray"], among("pool", text["pool"], ("local", "ray"))),
         workers=_workers(text["workers"], text["pool"], address),
         ray_address=address,
-        domain=_domain(config),
         timeout_s=number("timeout", text["timeout"], 1e6, "a positive number of seconds"),
         repeat=_repeat(text["repeat"]),
         duplicates=cast(
@@ -166,30 +155,29 @@ def read_options(config: pytest.Config) -> Options:
         npcs=_npcs(text["npcs"]),
         baseline=_baseline(config),
         level=number("level", text["level"], 1, "a number between 0 and 1"),
-        report=report_folder(config),
+        report=_report(config),
         report_url=report_url(text["report-url"]),
         film=filmed(text["film"], draws=not is_xdist_worker(config)),
         shrink=_shrink(text["shrink"]),
         shrink_capped=not text["shrink"],
         xfail_strict=bool(config.getini("garl_xfail_strict")),
-        unasserted=_unasserted(config),
-        probes=_probes(config),
+        # By default nobody reads the notes of a build server.
+        unasserted=_word(
+            config, "garl_unasserted", ("fail", "note"), "fail" if os.environ.get("CI") else "note"
+        ),
+        probes=_word(config, "garl_probes", ("first", "always", "never")),
         cases=config.rootpath / str(config.getini("garl_cases") or DEFAULT_CASES),
         cases_named=bool(config.getini("garl_cases")),
         folder=folder,
         root=config.rootpath,
-        controller=controller_of(config),
+        controller=str(of_controller.get(CONTROLLER, os.getpid())),
+        domain=_domain(config),
     )
 
 
 def population(budget: int) -> int:
     """Return the default population: a tenth of the budget, 8 to 20, at most the budget."""
     return min(LARGEST_POPULATION, max(SMALLEST_POPULATION, budget // 10), budget)
-
-
-def controller_of(config: pytest.Config) -> str:
-    """Return the id of the process that the run belongs to: xdist's controller, or this one."""
-    return str(given_by_controller(config).get(CONTROLLER, os.getpid()))
 
 
 def _value(config: pytest.Config, option: Option) -> str:
@@ -218,28 +206,30 @@ def _shrink(text: str) -> int:
     return number
 
 
-def _unasserted(config: pytest.Config) -> Literal["fail", "note"]:
-    """Return what the ini key says; by default nobody reads the notes of a build server."""
-    text = str(config.getini("garl_unasserted"))
-    text = text or ("fail" if os.environ.get("CI") else "note")
-    if text not in ("fail", "note"):
-        raise pytest.UsageError(f"garl_unasserted: found {text!r}, expected fail or note")
-    return cast(Literal["fail", "note"], text)
+def _word(config: pytest.Config, key: str, known: tuple[str, ...], default: str = "") -> Any:
+    """Return the value of an ini key, one of the known words."""
+    text = str(config.getini(key)) or default
+    if text not in known:
+        expected = f"{', '.join(known[:-1])} or {known[-1]}"
+        raise pytest.UsageError(f"{key}: found {text!r}, expected {expected}")
+    return text
 
 
-def _probes(config: pytest.Config) -> Literal["first", "always", "never"]:
-    text = str(config.getini("garl_probes"))
-    if text not in ("first", "always", "never"):
-        raise pytest.UsageError(f"garl_probes: found {text!r}, expected first, always or never")
-    return cast(Literal["first", "always", "never"], text)
+def _place(config: pytest.Config, name: str) -> tuple[str, Path]:
+    """Return a path of the command line, as seen from here, else of the ini key, from the root."""
+    given = config.getoption(f"--garl-{name}")
+    return (str(given), Path()) if given else (str(config.getini(f"garl_{name}")), config.rootpath)
 
 
 def _baseline(config: pytest.Config) -> Path | None:
-    """Return the file: the command line's as seen from here, the ini key's from the root."""
-    given = config.getoption("--garl-baseline")
-    text, folder = (given, Path()) if given else (config.getini("garl_baseline"), config.rootpath)
+    text, folder = _place(config, "baseline")
     if text and not (folder / text).is_file():
         raise wrong("baseline", text, "a file that `garl baseline save` wrote")
+    return folder / text if text else None
+
+
+def _report(config: pytest.Config) -> Path | None:
+    text, folder = _place(config, "report")
     return folder / text if text else None
 
 
@@ -254,17 +244,8 @@ def _method(text: str) -> str:
 
 
 def _domain(config: pytest.Config) -> Domain:
-    """Return the session's domain.
-
-    The command line names a file as seen from here, the ini key as seen from the root.
-    """
-    option, ini = config.getoption("--garl-domain"), config.getini("garl_domain")
-    if option:
-        return _read_domain(str(option), Path())
-    return _read_domain(str(ini or DEFAULT_DOMAIN), config.rootpath)
-
-
-def _read_domain(text: str, folder: Path) -> Domain:
+    named, folder = _place(config, "domain")
+    text = named or DEFAULT_DOMAIN
     try:
         return domain_with_policy(text, folder)
     except GarlError as error:
@@ -280,10 +261,7 @@ def _npcs(text: str) -> str:
     return text
 
 
-def _seed(config: pytest.Config, text: str) -> int:
-    given = given_by_controller(config)
-    if SEED in given:
-        return int(given[SEED])
+def _seed(text: str) -> int:
     if text == "random":
         import secrets
 

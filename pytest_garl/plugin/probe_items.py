@@ -39,7 +39,6 @@ from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.target import Target
 from pytest_garl.plugin.terminal_text import counted
 from pytest_garl.scenarios.conditions import active_conditions
-from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.own_navigation import within
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.loading import load_map
@@ -176,7 +175,7 @@ class _Flown:
         self.results: list[_Result] = []
         self.problem = ""
         map = load_map(target.map, run.options.map_folders)
-        domain = within(_domain(run.options, target), target.navigation)
+        domain = within(target.domain, target.navigation)
         from pytest_garl.search.probes import clear_scenario, probes_for, start_beside
 
         clear = clear_scenario(map, target.task, domain)
@@ -256,10 +255,6 @@ def _searched(
 def _has_landed(flight: CompletedFlight) -> bool:
     verdict = flight.result.verdict
     return flight.result.outcome == "landed" and not verdict.violation
-
-
-def _domain(options: Options, target: Target) -> Domain:
-    return target.domain or options.domain
 
 
 def excusing_case(corpus: Corpus, system: str, ending: str, probe: Scenario, twin: Scenario) -> str:

@@ -21,7 +21,7 @@ from pytest_garl.cases.census import marked_test_files
 from pytest_garl.cases.collected_tests import CollectedProject, CollectedTest
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
-from pytest_garl.plugin.inputs import corpus_of
+from pytest_garl.plugin.collection import corpus_of
 from pytest_garl.plugin.keys import COLLECTED
 from pytest_garl.plugin.lost_cases import project_of
 from pytest_garl.plugin.options import options_of
@@ -113,10 +113,11 @@ def pytest_configure(config: pytest.Config) -> None:
     root, options = config.rootpath, options_of(config)
     files = config.getoption("--garl-collect")
     if not files:
+        saved = corpus_of(config, options).all_entries() if options.cases.is_dir() else ()
         patterns, skipped = config.getini("python_files"), config.getini("norecursedirs")
         named = [
             entry.header.test.partition("::")[0]
-            for entry in (corpus_of(config).all_entries() if options.cases.is_dir() else ())
+            for entry in saved
             if entry.header is not None and "::" in entry.header.test
         ]
         files = [*marked_test_files(root, patterns, skipped), *named]

@@ -449,7 +449,7 @@ def _note_searches(
     """Note what identifies the selected searches; a resumed run has no search in another domain."""
     known = [key for key in facts.searches.values() if key.domain]
     for target, tests in searched:
-        domain = "" if options.repeat or target.domain is None else target.domain.label
+        domain = "" if options.repeat else target.domain.label
         key = SearchKey(
             system=target.system_name, map=target.map, domain=domain, tests=tuple(sorted(tests))
         )

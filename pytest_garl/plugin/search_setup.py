@@ -110,7 +110,7 @@ class Searches:
         stored = earlier.npcs if earlier else ""
         if not options.npcs and (stored in policy_names() or stored.endswith(".npz")):
             return stored
-        return options.policy_in(target.domain or options.domain)
+        return options.policy_in(target.domain)
 
     def sources(self, target: Target) -> tuple[tuple[str, str], ...]:
         """Return name and hash of everything that a target's landing system consists of."""
@@ -147,7 +147,7 @@ class Searches:
                 {slot: _scenario_of(self.options, each) for slot, each in wanted.items()}
             )
         map = load_map(target.map, self.options.map_folders)
-        domain = within(target.domain or self.options.domain, target.navigation)
+        domain = within(target.domain, target.navigation)
         plan = SearchPlan(
             map=map,
             genome=genome_of(domain, map, target.task),

@@ -21,7 +21,7 @@ from pytest_garl.execution.ray.ray_pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, package_sha256, reference_to
 from pytest_garl.execution.stored_ledger import check_stored, stored_flight_s
 from pytest_garl.npcs.policy_catalogue import policy_spec
-from pytest_garl.plugin.inputs import corpus_of
+from pytest_garl.plugin.collection import corpus_of
 from pytest_garl.plugin.keys import RUN
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
@@ -51,7 +51,7 @@ def begin_run(config: pytest.Config, options: Options) -> None:
             pool=pool,
             investigations=_investigations(config, options, ledger, pool),
             simulator=reference_to(own) if own else BUILT_IN,
-            corpus=corpus_of(config),
+            corpus=corpus_of(config, options),
             lock=lock,
             flight_s=ledger.facts.earlier_flight_s,
         )
@@ -133,7 +133,7 @@ def _investigations(
     from pytest_garl.cases.investigation_queue import Investigations
 
     shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
-    return Investigations(ledger, pool, corpus_of(config), shrinking, options.workers or 1)
+    return Investigations(ledger, pool, corpus_of(config, options), shrinking, options.workers or 1)
 
 
 def _shared_ledger(path: Path) -> Ledger:

@@ -35,7 +35,7 @@ class Target:
     """Empty for a saved case whose file cannot be read."""
     task: Task = DEFAULT_TASK
     """The marker on the ground and the start of a search; cases and files have their own."""
-    domain: Domain | None = None
+    domain: Domain
     """What a search varies, and what a case is compared with."""
     slot: Slot = FIRST_SLOT
     deterministic: bool = True
@@ -112,7 +112,7 @@ class Target:
         ]
         if self.task != DEFAULT_TASK:
             facts.append(dataclasses.asdict(self.task))
-        if self.domain is not None and self.is_searched:
+        if self.is_searched:
             facts.append(self.domain.label)
         if self.entry is not None:
             facts += [str(self.entry.path), self.live]
@@ -133,7 +133,7 @@ class Target:
 
         The case is flown all the same: what was found once must not come back unnoticed.
         """
-        if self.case is None or self.entry is None or self.domain is None:
+        if self.case is None or self.entry is None:
             return ""
         map = load_map(self.map, map_folders)
         values = "; ".join(self.domain.outside(self.case.scenario, map))

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.plugin.xdist import WIDTH, given_by_controller
+from pytest_garl.plugin.xdist import WIDTH
 
 MOST_NAMED = 5
 """A line names so many flights and counts the rest."""
@@ -21,9 +21,9 @@ _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|m/s|m|s)(?!\w))")
 
 def width_of(config: pytest.Config) -> int:
     """Return the number of columns; without a terminal 80, as for pytest."""
-    given = given_by_controller(config)
-    if WIDTH in given:
-        return max(_NARROW, int(given[WIDTH]))
+    given = getattr(config, "workerinput", {}).get(WIDTH)
+    if given is not None:
+        return max(_NARROW, int(given))
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
     return max(_NARROW, reporter._tw.fullwidth) if reporter is not None else 80
 

@@ -35,8 +35,9 @@ class _Collector:
             marker = marker_of(item)
             if marker is None or not takes_landing(item):
                 continue
-            arguments = read_marker(marker, options_of(session.config))
-            self.targets += [(arguments.on(map), arguments.map_folders) for map in arguments.maps]
+            options = options_of(session.config)
+            targets = read_marker(marker, options).targets.values()
+            self.targets += [(target, options.map_folders) for target in targets]
 
 
 def targets_of(argument: str) -> list[tuple[Target, tuple[Path, ...]]]:

@@ -1,12 +1,10 @@
-"""What a process knows of pytest-xdist: whether it is a worker, and what its controller gave it."""
+"""pytest-xdist: whether a process is one of its workers, and the keys of what these are given."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
-# The keys of what the controller gives its workers.
+# The keys of ``config.workerinput``, which the controller gives its workers.
 CONTROLLER = "garl_controller"
 """The process id of the controller."""
 SEED = "garl_seed"
@@ -18,9 +16,3 @@ WIDTH = "garl_width"
 def is_xdist_worker(config: pytest.Config) -> bool:
     """Whether this process is one of pytest-xdist's workers."""
     return hasattr(config, "workerinput")
-
-
-def given_by_controller(config: pytest.Config) -> dict[str, Any]:
-    """Return what xdist's controller gave this worker; nothing in any other process."""
-    found: dict[str, Any] = getattr(config, "workerinput", {})
-    return found

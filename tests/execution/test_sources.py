@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution.sources import data_files, source_hashes, sources_sha256
 
 _NUMBERS = itertools.count()
@@ -108,5 +109,5 @@ def test_data_folder_means_all_files_in_it(tmp_path: Path) -> None:
         (tmp_path / name).write_text(name)
     found = data_files(["model", "one.txt"], tmp_path)
     assert [*found] == ["model/a.bin", "model/deep/b.bin", "one.txt"]
-    with pytest.raises(FileNotFoundError, match=r"gone\.txt"):
+    with pytest.raises(LandingSystemError, match=r"there is no 'gone\.txt'"):
         data_files(["gone.txt"], tmp_path)

@@ -100,7 +100,9 @@ def test_unreadable_scenario_is_one_message(
     project(pytester)
     (pytester.path / "one.toml").write_text(text)
     result = run(pytester, "--garl-workers=0", "--garl-repeat=one.toml")
-    result.stdout.fnmatch_lines([f"*one.toml: *{words}*"])
+    (line,) = [each for each in result.stderr.lines if "one.toml" in each]
+    assert words in line
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
     assert "Traceback" not in result.stdout.str() + result.stderr.str()
 
 

@@ -12,6 +12,7 @@ import pytest
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.plugin.landing import Landing
 from pytest_garl.plugin.target import Target
+from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.verdicts.verdict import Limits
 from tests.support.results import flight_result
 
@@ -23,7 +24,7 @@ class System:
 
 
 def landing(is_shown_elsewhere: Callable[[], bool] = lambda: False, **result: Any) -> Landing:
-    target = Target(system=System, limits=Limits(), map="lawn")
+    target = Target(system=System, limits=Limits(), domain=domain_named("field"), map="lawn")
     flown = flight_result(**result)
     flight = CompletedFlight(result=flown, sha256="", record=Path("none.npz"))
     return Landing(target, flight, is_shown_elsewhere=is_shown_elsewhere)
