@@ -51,7 +51,6 @@ KEPT_APART = {
     "search/user_method": "every pytest run loads the catalogue, and few name such a method",
     "simulation/physics/leap": "one way to move; npc chooses among them",
     "simulation/physics/solids_ahead": "geometry of maps, which knows no NPC",
-    "verdicts/excuses": "its figures have reasons of their own; judge takes no part in them",
 }
 """Short files with one importer, in the importer's room, and why they are no part of it."""
 

@@ -132,7 +132,8 @@ class NominalView:
 
     ``place`` is "search" for a place of the search above the told coordinate, or "above" for a
     place above the marker; ``height_m`` is that of the camera's UAV; ``time_s`` is when a nominal
-    flight is there, and ``duration_s`` how long it looks from there.
+    flight is there, and ``duration_s`` how long it looks from there.  ``attempt`` is 0 for the
+    first landing; if it waits above the marker and comes down again, that has the next number.
     """
 
     time_s: float
@@ -140,6 +141,7 @@ class NominalView:
     place: Literal["search", "above"]
     height_m: float
     marker: MarkerView
+    attempt: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,8 +219,9 @@ class Flight:
     ``cpu`` names that class.  ``wall_s`` is what it cost and is in no hash.
     ``touchdown`` is None for a flight that did not touch the ground after its take-off;
     ``earlier_touchdowns`` are those after which the UAV took off again, in order.
-    ``nominal_views`` show how a nominal landing would have seen the marker; they are empty for
-    flights that landed, hit something or crashed, and for simulators that do not record them.
+    ``nominal_views`` show how a nominal landing would have seen the marker, and would have seen it
+    again while it waited, if the sight may change during the flight; they are empty for flights
+    that landed, hit something or crashed, and for simulators that do not record them.
     ``nominal_arrival_s`` and ``nominal_landing_s`` are when a nominal flight is above the marker
     and on it.  ``rangefinder`` is the airframe's, None without one.  ``data_read`` names those of
     ``OBSERVED`` that the landing system read in any frame; None for simulators that do not record

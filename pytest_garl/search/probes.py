@@ -58,8 +58,8 @@ FARTHEST_VIEW, NEAREST_VIEW = 0.8, 0.2
 """A marker is readable low only if it is not from this share of the height on, but from the other.
 """
 
-_ON_EXCUSES = (", and never gave up where nobody could have landed", ", excused")
-"""What a verdict says in its first sentence of a flight in which nobody could have landed."""
+_EXCUSED = ", excused"
+"""What a verdict says in its first sentence of a landing that was given up with an excuse."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,13 +85,12 @@ class Probe:
     def ending(self, verdict: Verdict) -> str:
         """Return how its flight ended in half a line.
 
-        Where landing may be given up, nothing is said of whether anybody could have landed: a
-        verdict asks that for the time of a nominal landing, and the marker may be back later.
+        Where landing may be given up, nothing is said of an excuse: a verdict asks whether anybody
+        could have landed before it was given up, and the marker may be back later.
         """
         text = headline(verdict.story)
         if self.may_give_up and verdict.excuse:
-            for clause in _ON_EXCUSES:
-                text = text.replace(clause, "", 1)
+            text = text.replace(_EXCUSED, "", 1)
         return text
 
 

@@ -3,6 +3,10 @@
 A nominal landing climbs to the search height, crosses to the coordinate that the mission tells,
 looks for the marker from there and from a ring about it, crosses to the marker and comes down.
 Its camera is level, its nose points east.  Nothing is painted.
+
+Where the sight of the marker may change, it waits if need be: above the marker it climbs and comes
+down again, until the time is up or the landing was given up.  So a marker that is covered for a
+minute and then lies free is seen.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ from typing import Literal
 from pytest_garl.flight.flight import Flight, NominalView, ObjectRecord
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.placed import Placed
+from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.solids import BodyPose
@@ -57,6 +62,7 @@ class _Look:
     place: Literal["search", "above"]
     place_m: Place
     height_m: float
+    attempt: int
 
 
 def nominal_arrival_s(placed: Placed) -> float:
@@ -67,9 +73,7 @@ def nominal_arrival_s(placed: Placed) -> float:
 
 def nominal_landing_s(placed: Placed) -> float:
     """Return when a pilot that knows the marker's place has landed on it without waiting."""
-    slow = (SLOW_BELOW_M - LAND_BELOW_M) / (DESCENT_MPS / 2)
-    descent_s = (SEARCH_ALTITUDE_M - SLOW_BELOW_M) / DESCENT_MPS + slow
-    return nominal_arrival_s(placed) + descent_s
+    return nominal_arrival_s(placed) + _descent_s(SEARCH_ALTITUDE_M)
 
 
 def nominal_views(flight: Flight, placed: Placed, camera: Camera) -> tuple[NominalView, ...]:
@@ -77,14 +81,15 @@ def nominal_views(flight: Flight, placed: Placed, camera: Camera) -> tuple[Nomin
 
     The objects are where they were at that time of the flight, or at its end if it had ended; the
     environment is that to which NPC policies had changed it.  The UAV's own path plays no part.
-    A camera that fails shows nothing.  The camera is the true one, turned and dirty as the
+    A camera that fails shows nothing.  Later attempts are those whose descent ends before the
+    system gave up, or before the time was up.  The camera is the true one, turned and dirty as the
     scenario says; it hovers while it looks, so that a long exposure does not blur.
     """
     scenario = placed.scenario
     renderer = renderer_of(placed, true_camera(camera, scenario), colour=False)
     attitude = Mounting(scenario).attitude(LEVEL)
     shown, views, outage = scenario, [], Event(scenario, "outage")
-    for look in _looks(placed):
+    for look in _looks(placed, _waits_until_s(flight, scenario)):
         present = environment_at(scenario, flight, look.time_s)
         if present != shown:
             renderer.change(present)
@@ -103,6 +108,7 @@ def nominal_views(flight: Flight, placed: Placed, camera: Camera) -> tuple[Nomin
                 place=look.place,
                 height_m=look.height_m,
                 marker=marker,
+                attempt=look.attempt,
             )
         )
     return tuple(views)
@@ -119,9 +125,22 @@ def with_nominal_landing(flight: Flight, placed: Placed, camera: Camera) -> Flig
     )
 
 
-def _looks(placed: Placed) -> Iterator[_Look]:
+def _waits_until_s(flight: Flight, scenario: Scenario) -> float:
+    """Return until when a nominal landing may try again; 0 if it would see the same again.
+
+    What covers the marker, a camera that fails, and bodies come and go, and only bodies change the
+    weather.
+    """
+    comes_and_goes = any(scenario[f"{event}.lasts_s"] > 0 for event in ("cover", "outage"))
+    if not comes_and_goes and not flight.objects:
+        return 0.0
+    given_up = (each.time_s for each in flight.events if each.name == "abort_command")
+    return next(given_up, flight.elapsed_s)
+
+
+def _looks(placed: Placed, until_s: float) -> Iterator[_Look]:
     """Yield the looks in the order of time, none longer than ``_LONGEST_LOOK_S``."""
-    for look in _stays(placed):
+    for look in _stays(placed, until_s):
         count = math.ceil(look.duration_s / _LONGEST_LOOK_S)
         for index in range(count):
             yield dataclasses.replace(
@@ -131,8 +150,11 @@ def _looks(placed: Placed) -> Iterator[_Look]:
             )
 
 
-def _stays(placed: Placed) -> Iterator[_Look]:
-    """Yield where a nominal landing stays, from when on, and for how long."""
+def _stays(placed: Placed, until_s: float) -> Iterator[_Look]:
+    """Yield where a nominal landing stays, from when on, and for how long.
+
+    The first attempt is always whole; a further one has its touchdown by ``until_s``.
+    """
     told, marker, start = placed.told_m, placed.marker_m, placed.start_m
     turns = [2 * math.pi * index / RING_PLACES for index in range(RING_PLACES)]
     ring = [(told[0] + RING_M * math.cos(a), told[1] + RING_M * math.sin(a)) for a in turns]
@@ -145,16 +167,39 @@ def _stays(placed: Placed) -> Iterator[_Look]:
             place="search",
             place_m=place,
             height_m=SEARCH_ALTITUDE_M,
+            attempt=0,
         )
         now += stay_s
     now += _across_s(ring[-1], marker)
+    for attempt in itertools.count():
+        if attempt and now + _descent_s(SIGHT_HEIGHTS_M[0]) > until_s:
+            return
+        yield from _descent(now, marker, attempt)
+        now += (SIGHT_HEIGHTS_M[0] - SLOW_BELOW_M) * (1 / DESCENT_MPS + 1 / CLIMB_MPS)
+
+
+def _descent(now: float, marker: Place, attempt: int) -> Iterator[_Look]:
+    """Yield the stays of a descent that begins above the marker."""
     # Each height stands for the way about it: from halfway above to halfway below.
     middles = [(high + low) / 2 for high, low in itertools.pairwise(SIGHT_HEIGHTS_M)]
     tops, ends = (SIGHT_HEIGHTS_M[0], *middles), (*middles, SLOW_BELOW_M)
     for height, top, end in zip(SIGHT_HEIGHTS_M, tops, ends, strict=True):
         took_s = (top - end) / DESCENT_MPS
-        yield _Look(time_s=now, duration_s=took_s, place="above", place_m=marker, height_m=height)
+        yield _Look(
+            time_s=now,
+            duration_s=took_s,
+            place="above",
+            place_m=marker,
+            height_m=height,
+            attempt=attempt,
+        )
         now += took_s
+
+
+def _descent_s(height_m: float) -> float:
+    """Return what a descent to the ground takes: half the speed near the ground."""
+    slow_s = (SLOW_BELOW_M - LAND_BELOW_M) / (DESCENT_MPS / 2)
+    return (height_m - SLOW_BELOW_M) / DESCENT_MPS + slow_s
 
 
 def _up_s(height_m: float) -> float:

@@ -84,6 +84,11 @@ class Evidence:
         """When the landing was given up: at the command, or when the time was over."""
         return self.flight.elapsed_s if self.said_abort_s is None else self.said_abort_s
 
+    @property
+    def waited(self) -> bool:
+        """Whether the time was up without a landing, and nothing had been given up."""
+        return self.flight.outcome == "not_landed" and self.said_abort_s is None
+
     @cached_property
     def decided_s(self) -> float:
         """When the event happened that decided the flight; the end if nothing tells it."""
@@ -225,11 +230,28 @@ class Evidence:
         """Return the frames up to a time in which the marker could be read."""
         return [step for step in self.readable if step.time_s <= time_s]
 
+    @property
+    def readable_s(self) -> float:
+        """For how long the marker could be read in the frames of the flight until it gave up."""
+        return len(self.readable_until(self.gave_up_s)) * self.frame_s
+
+    @property
+    def frame_s(self) -> float:
+        """The time between two frames; 0 if there were not two."""
+        times = [step.time_s for step in self.flight.steps[:2]]
+        return times[1] - times[0] if len(times) == 2 else 0.0
+
     @cached_property
     def expected_readable_s(self) -> float:
-        """For how long a nominal landing could read the marker, by expectation."""
-        views = self.flight.nominal_views
-        return math.fsum(each.duration_s * readable_probability(each.marker) for each in views)
+        """For how long a nominal landing could read the marker at best, by expectation.
+
+        A nominal landing may wait and try again; its best attempt counts.
+        """
+        attempts: dict[int, list[float]] = {}
+        for each in self.flight.nominal_views:
+            expected_s = each.duration_s * readable_probability(each.marker)
+            attempts.setdefault(each.attempt, []).append(expected_s)
+        return max((math.fsum(each) for each in attempts.values()), default=0.0)
 
     def was_in_view(self, body: str, time_s: float) -> bool:
         """Whether the camera showed a dynamic object within two seconds before ``time_s``."""

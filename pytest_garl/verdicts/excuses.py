@@ -1,7 +1,8 @@
 """Excuses: whether anybody could have landed, from ground truth alone.
 
 The path that a landing system chose never excuses it: a system that gives up at once has seen
-nothing, and is not excused.
+nothing, and is not excused.  It may show that somebody could have landed: where a flight that
+lasted until the time was up could read the marker for long enough, nobody needed another path.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pytest_garl.verdicts.verdict import NO_LANDING, Excuse
 
 READABLE_S = 2.0
 """A nominal landing must be able to read the marker for this long in all: from the search, and
-from above the marker."""
+from above the marker; or from above it on a later descent."""
 CYLINDER_M = 2.0
 """Radius of the marker's safety cylinder: UAV and body, each half a metre, and a metre between."""
 CYLINDER_TOP_M = 4.0
@@ -35,14 +36,26 @@ def excuse(evidence: Evidence) -> tuple[Excuse, str]:
         return "", ""
     if evidence.stands_since_s(evidence.gave_up_s) is not None:
         return "", ""
-    readable_s = evidence.expected_readable_s
-    if evidence.flight.nominal_views and readable_s < READABLE_S:
+    if _is_undetectable(evidence):
+        waits = any(view.attempt for view in evidence.flight.nominal_views)
+        attempts = ", also in later attempts, for at most" if waits else ", for"
         return "undetectable", (
-            "Nobody could see the marker: where a landing looks for it, it could be read for "
-            f"{readable_s:.1f} s in all, and {READABLE_S:g} s are needed."
+            f"The marker could not be read for long enough: where a landing looks for it{attempts} "
+            f"{evidence.expected_readable_s:.1f} s in all, and {READABLE_S:g} s are needed."
         )
     blocked = _blocked(evidence)
     return ("blocked", blocked) if blocked else ("", "")
+
+
+def _is_undetectable(evidence: Evidence) -> bool:
+    """Whether no nominal landing could read the marker for long enough.
+
+    Of a flight that lasted until the time was up its own frames are asked as well: it may have been
+    nearer to the marker, or there at a better time.
+    """
+    if not evidence.flight.nominal_views or evidence.expected_readable_s >= READABLE_S:
+        return False
+    return not evidence.waited or evidence.readable_s < READABLE_S
 
 
 def _blocked(evidence: Evidence) -> str:

@@ -195,8 +195,7 @@ def must_give_up(evidence: Evidence) -> bool:
     Where nobody can land, the right answer is to give up in time.  Where giving up is forbidden, no
     right answer is left but to wait.
     """
-    waited = evidence.flight.outcome == "not_landed" and evidence.said_abort_s is None
-    return waited and evidence.limits.abort != "violation"
+    return evidence.waited and evidence.limits.abort != "violation"
 
 
 def _no_landing_cause(evidence: Evidence, end: str) -> tuple[ViolationType, str, str]:
@@ -226,7 +225,7 @@ def _no_landing_cause(evidence: Evidence, end: str) -> tuple[ViolationType, str,
         return "late", f"late:no-time:{phase}", text
     if lost:
         return "II", f"II:lost:{phase}", f"{end}{when}; {view}.{report}"
-    seen_s = len(readable) * _frame_s(flight)
+    seen_s = len(readable) * evidence.frame_s
     ago = f", last {at_s - last:.1f} s before" if at_s - last > RECENT_S else ""
     text = (
         f"Gave up{when} with the marker in view{ago}; it had been readable for {seen_s:.1f} s."
@@ -254,7 +253,7 @@ def _unranged_text(evidence: Evidence) -> str:
         return ""
     flown = [s for s in flight.steps if flight.uav.time_s[start] <= s.time_s <= until_s]
     without = [step.time_s for step in flown if step.rangefinder_m is None]
-    lasted_s = len(without) * _frame_s(flight)
+    lasted_s = len(without) * evidence.frame_s
     if lasted_s < UNRANGED_S:
         return ""
     reach = f"{flight.rangefinder.least_m:g} to {flight.rangefinder.most_m:g} m"
@@ -340,8 +339,3 @@ def _target_text(evidence: Evidence, at_s: float) -> str:
     if name := evidence.decoy_at(target):
         return f"; its target was {name}"
     return f"; its target was {off_m:.1f} m off the marker"
-
-
-def _frame_s(flight: Flight) -> float:
-    times = [step.time_s for step in flight.steps[:2]]
-    return times[1] - times[0] if len(times) == 2 else 0.0

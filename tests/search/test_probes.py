@@ -169,12 +169,6 @@ def test_not_to_land_is_right_where_the_marker_is_hidden(
     [
         (
             True,
-            "Not landed, and never gave up where nobody could have landed. Nobody could see it. "
-            "At 120.0 s the UAV was 7.5 m up, over the marker.",
-            "not landed, 7.5 m up, over the marker",
-        ),
-        (
-            True,
             "Gave up, excused. Nobody could see it. At 46.0 s the UAV was 9.8 m up, over the "
             "marker.",
             "gave up, 9.8 m up, over the marker",
@@ -191,10 +185,10 @@ def test_a_marker_that_comes_back_late_is_not_said_to_be_readable_by_nobody(
     may_give_up: bool, story: str, told: str
 ) -> None:
     verdict = Verdict(
-        outcome="not_landed",
-        primary="time",
-        violation_type="late",
-        signature="late:never-gave-up",
+        outcome="gave_up",
+        primary=None,
+        violation_type=None,
+        signature="",
         paper_violation=True,
         margins=(),
         story=story,

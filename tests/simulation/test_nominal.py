@@ -26,9 +26,14 @@ from pytest_garl.simulation.nominal import (
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.excuses import READABLE_S
+from pytest_garl.verdicts.judge import judge
+from pytest_garl.verdicts.verdict import Limits
 from tests.support.flights import EMPTY, LAWN, STAND, Hovers, Scripted, nominal
 
 PEOPLE = dataclasses.replace(LAWN, objects=(("person", 4),))
+
+
+COVER = {"cover__share_percent": 100.0, "cover__from_s": 5.0, "cover__lasts_s": 50.0}
 
 
 class AbortsAtOnce(Scripted):
@@ -142,6 +147,47 @@ def test_people_who_stand_on_the_marker_hide_it() -> None:
     ]
     assert hidden[0] < 0.05 < 0.15 < hidden[1]
     assert Evidence(crowded).expected_readable_s < Evidence(free).expected_readable_s - 3
+
+
+@pytest.mark.parametrize(
+    ("system", "snow", "signature", "readable"),
+    [
+        # After the cover the marker lies free for a minute, or under snow.
+        (Hovers, 0.0, "II:never-seen:cover", True),
+        (Hovers, 1.0, "late:never-gave-up", False),
+        (AbortsAtOnce, 0.0, "", False),
+    ],
+)
+def test_a_landing_that_waits_sees_a_marker_that_comes_back(
+    system: type, snow: float, signature: str, readable: bool
+) -> None:
+    scenario = nominal(**COVER, environment__road_snow=snow, marker__y=0.9)
+    flight = fly(scenario, system, STAND, map=EMPTY, time_limit_s=120)
+    attempts = {view.attempt for view in flight.nominal_views}
+    assert (max(attempts) > 3) == (system is Hovers)
+    assert attempts == {*range(len(attempts))}
+    assert max(view.time_s for view in flight.nominal_views) < 120
+    assert (Evidence(flight).expected_readable_s >= READABLE_S) == readable
+    assert judge(flight, Limits()).signature == signature
+
+
+@pytest.mark.parametrize(
+    ("genes", "map", "tries_again"),
+    [
+        ({}, EMPTY, False),
+        ({"environment__fog": 1.0}, EMPTY, False),
+        ({"outage__lasts_s": 5.0}, EMPTY, True),
+        ({}, PEOPLE, True),
+    ],
+)
+def test_a_landing_waits_only_for_what_comes_and_goes(
+    genes: Any, map: Map, tries_again: bool
+) -> None:
+    scenario = nominal(**genes)
+    alone = fly(scenario, Hovers, STAND, map=EMPTY, time_limit_s=60)
+    flight = dataclasses.replace(alone, objects=given_up(map, {}).objects)
+    views = nominal_views(flight, Placed(scenario, map), Camera())
+    assert any(view.attempt for view in views) == tries_again
 
 
 def test_objects_stay_where_a_flight_that_ended_early_left_them() -> None:

@@ -122,7 +122,7 @@ def test_a_marker_under_snow_excuses_giving_up() -> None:
     snow = scene(genes=HERE | {"environment.road_snow": 0.9})
     verdict = judge(snow.fly(Route(snow.marker, last=give_up, hold_s=5.0)), Limits())
     assert (verdict.primary, verdict.excuse) == (None, "undetectable")
-    assert "Nobody could see the marker" in verdict.story
+    assert "The marker could not be read for long enough" in verdict.story
 
 
 def test_a_person_who_stays_on_the_marker_excuses_giving_up_and_not_a_collision() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.airframe import Rangefinder
-from pytest_garl.flight.flight import Event, Flight
+from pytest_garl.flight.flight import Event, Flight, MarkerView
 from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.judge import closest_call, judge, why_undecided
 from pytest_garl.verdicts.verdict import Limits
@@ -163,9 +163,62 @@ def test_hovering_until_the_time_is_up_is_not_excused_by_what_excuses_giving_up(
     assert (verdict.primary, verdict.signature) == (primary, signature)
     assert verdict.excuse == ("" if signature else "undetectable")
     assert verdict.no_landing == ("needless" if signature else "excused")
-    assert "Nobody could see the marker" in verdict.story
+    assert "The marker could not be read for long enough" in verdict.story
     if signature:
         assert verdict.story.startswith("Not landed, and never gave up where nobody could have")
+
+
+@pytest.mark.parametrize(
+    ("outcome", "readable_frames", "signature", "excuse"),
+    [
+        # Half a second apart: three frames are 1.5 s, and 2 s are needed.
+        ("not_landed", 3, "late:never-gave-up", ""),
+        ("not_landed", 4, "late:not-landed:approach", ""),
+        ("gave_up", 4, "", "undetectable"),
+    ],
+)
+def test_who_could_read_the_marker_until_the_time_was_up_could_have_landed(
+    outcome: str, readable_frames: int, signature: str, excuse: str
+) -> None:
+    """A nominal landing does not come as low as this system did, or came at another time."""
+    times = [28.0 + number / 2 for number in range(4)]
+    steps = tuple(
+        step(time_s, marker=CLEAR if number < readable_frames else FOGGY)
+        for number, time_s in enumerate(times)
+    )
+    hovers = flight(outcome, (0.0, 0.0, 8.0), nominal_views=nominal(FOGGY), steps=steps)
+    verdict = judge(hovers, Limits())
+    assert (verdict.signature, verdict.excuse) == (signature, excuse)
+    assert ("nobody could have landed" in verdict.story) == signature.endswith("gave-up")
+
+
+@pytest.mark.parametrize(
+    ("later", "hovers_until_the_end", "gives_up"),
+    [(FOGGY, "late:never-gave-up", ""), (CLEAR, "II:never-seen", "II:never-seen")],
+)
+def test_a_marker_that_is_readable_in_a_later_attempt_excuses_nothing(
+    later: MarkerView, hovers_until_the_end: str, gives_up: str
+) -> None:
+    again = dataclasses.replace(nominal(later)[0], time_s=20.0, attempt=1)
+    views = (*nominal(FOGGY), again)
+    waits = judge(flight("not_landed", (0.0, 0.0, 8.0), nominal_views=views), Limits())
+    assert waits.signature == hovers_until_the_end
+    assert ("also in later attempts, for at most" in waits.story) == (later is FOGGY)
+    leaves = judge(flight("gave_up", (0.0, 0.0, 8.0), nominal_views=views), Limits())
+    assert leaves.signature == gives_up
+    # Forbidden to give up, it may wait only where nobody could have landed.
+    must_wait = Limits(abort="violation")
+    obeys = judge(flight("not_landed", (0.0, 0.0, 8.0), nominal_views=views), must_wait)
+    assert obeys.violation == (later is CLEAR)
+
+
+def test_attempts_are_not_added_up() -> None:
+    """A landing that reads the marker for one second does not land, however often it tries."""
+    first = nominal(CLEAR, 1.5)[0]
+    again = dataclasses.replace(first, time_s=20.0, attempt=1)
+    waits = flight("not_landed", (0.0, 0.0, 8.0), nominal_views=(first, again))
+    assert Evidence(waits).expected_readable_s < 2.0
+    assert judge(waits, Limits()).signature == "late:never-gave-up"
 
 
 def test_a_system_that_gives_up_at_once_is_not_excused_by_its_own_path() -> None:
