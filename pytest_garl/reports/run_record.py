@@ -23,6 +23,7 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.severity import Severity
 from pytest_garl.reports.causes import cause_of, tells_cause, title_of
 from pytest_garl.reports.control_arm import ControlArm
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.verdicts.ending import ending_of
 from pytest_garl.verdicts.kinds import hill_number
 from pytest_garl.verdicts.paper_metrics import top_k
@@ -141,20 +142,31 @@ class KindRecord:
         return next((each for each in self.saved if each.case == self.case), first)
 
     def with_cases(
-        self, search: SearchKey, saved: Iterable[SavedCase], others: Sequence[Case] = ()
+        self,
+        search: SearchKey,
+        saved: Iterable[SavedCase],
+        others: Sequence[Case] = (),
+        flights: Sequence[LedgerFlight] = (),
     ) -> Self:
         """Return it with the saved cases of its search and ending, and the cause they tell.
 
-        ``others`` may tell it too.
+        ``others`` may tell it too.  ``flights`` are its own: of several cases one that was shrunk
+        from the first of them tells it.  The twin of another kind's flight may end alike, and its
+        case has another cause.
         """
         place = search.system, search.map, ending_of(self.signature)
         mine = tuple(each for each in saved if place_of(each.case) == place)
-        telling = (
+        telling = [
             case
             for case in (*(each.case for each in mine), *others)
             if place_of(case) == place and tells_cause(case)
-        )
-        return dataclasses.replace(self, saved=mine, case=next(telling, None))
+        ]
+        if len(telling) > 1:
+            # Shrinking and twins keep the seed of the flight with which they began.
+            seeds = [parse_scenario(each.scenario).seed for each in flights]
+            order = {seed: number for number, seed in reversed([*enumerate(seeds)])}
+            telling.sort(key=lambda case: order.get(case.scenario.seed, len(seeds)))
+        return dataclasses.replace(self, saved=mine, case=next(iter(telling), None))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -331,7 +343,13 @@ class SearchRecord:
 
     def with_cases(self, saved: Sequence[SavedCase], others: Sequence[Case] = ()) -> Self:
         """Return it with the causes that cases tell; kinds of one cause stand together."""
-        told = [kind.with_cases(self.key, saved, others) for kind in self.kinds]
+        flights = {each.id.slot_id: each for each in self.flights}
+        told = [
+            kind.with_cases(
+                self.key, saved, others, [flights[slot] for slot in kind.slots if slot in flights]
+            )
+            for kind in self.kinds
+        ]
         return dataclasses.replace(self, kinds=tuple(by_cause(told, lambda kind: kind)))
 
     def _without_landing(self, outcome: str) -> Mapping[NoLanding, int]:

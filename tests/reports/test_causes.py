@@ -9,10 +9,14 @@ import pytest
 
 from pytest_garl.cases.case import Case
 from pytest_garl.execution.facts import SearchKey
+from pytest_garl.execution.flight_id import FlightId, Slot
+from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.severity import Severity
 from pytest_garl.reports.causes import cause_of, counted_causes, title_of
 from pytest_garl.reports.run_record import KindRecord, SavedCase, SearchRecord
+from pytest_garl.scenarios.files import dump_scenario
 from tests.cases.samples import SYSTEM, case
+from tests.support.results import flight_result
 
 DOG = Severity(about="body", grade="careless", type="dog", objects=1, speed_mps=4.0)
 
@@ -111,6 +115,38 @@ def test_a_case_that_is_not_saved_tells_a_cause_if_no_saved_one_does() -> None:
     search = record(kind("II:never-seen", 4))
     assert search.with_cases([saved], [rain]).kinds[0].case is fog
     assert search.with_cases([], [rain]).kinds[0].case is rain
+
+
+def test_the_case_of_a_kinds_own_flight_tells_its_cause() -> None:
+    """The twin of another kind's flight may end alike, with nothing unusual."""
+    twin = shrunk("II:never-seen", conditions())
+    fog, rain = (
+        shrunk("II:never-seen", severity, scenario=dataclasses.replace(twin.scenario, seed=seed))
+        for seed, severity in (
+            (7, conditions(fog="visibility 10 m")),
+            (8, conditions(rain="2 mm/h")),
+        )
+    )
+    saved = [
+        SavedCase(path=Path(f"{number}.toml"), case=each, known=False)
+        for number, each in enumerate((twin, rain, fog))
+    ]
+    shown = record(kind("II:never-seen", 3))
+    flown = dataclasses.replace(
+        shown, flights=(ledger_flight(1, fog), ledger_flight(2, rain), ledger_flight(4, twin))
+    )
+    assert flown.with_cases(saved).kinds[0].case is fog
+    assert shown.with_cases(saved).kinds[0].case is twin
+
+
+def ledger_flight(number: int, case: Case) -> LedgerFlight:
+    return LedgerFlight(
+        id=FlightId(search="s", map="lawn", slot=Slot(generation=0, index=number)),
+        system=SYSTEM,
+        scenario=dump_scenario(case.scenario),
+        result=flight_result(),
+        sha256="",
+    )
 
 
 def telling(cases: Sequence[Case], map: str = "lawn") -> Case | None:
