@@ -235,12 +235,21 @@ class Case:
         return was_flown and not self.severity.is_guess
 
     @property
+    def removed(self) -> str:
+        """What shrinking removed, in words.
+
+        The marker's place counts as a condition there, and nowhere else: a scenario with nothing
+        unusual has a place.  So the place is named if it is what is left.
+        """
+        removed = self.evidence.removed
+        counts_place = "condition" in removed and self.scenario.has_moved_marker
+        return f"{removed}, not the marker's place" if counts_place else removed
+
+    @property
     def shrinking(self) -> str:
         """What shrinking removed, in words, or that the case was not shrunk."""
-        removed = self.evidence.removed
-        if removed == "nothing" and self.severity.about and not self.is_shrunk:
-            return "not shrunk"
-        return f"shrinking removed {removed}"
+        is_tried = self.evidence.removed != "nothing" or not self.severity.about
+        return f"shrinking removed {self.removed}" if is_tried or self.is_shrunk else "not shrunk"
 
     @property
     def asserting_test(self) -> str:

@@ -6,7 +6,6 @@ import re
 from dataclasses import dataclass
 from typing import Self
 
-from pytest_garl.cases.simplification import MARKER_PLACE
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.scenario import Scenario
 
@@ -30,7 +29,7 @@ class Contents:
     def of(cls, scenario: Scenario) -> Self:
         """Return those of a scenario."""
         conditions = active_conditions(scenario)
-        is_moved = any(scenario[key] != 0 for key in MARKER_PLACE)
+        is_moved = scenario.has_moved_marker
         return cls(
             objects=sum(key.endswith(".velocity") for key, _ in scenario.genes),
             conditions=len(conditions) + is_moved,

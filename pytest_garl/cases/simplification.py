@@ -11,12 +11,10 @@ from pytest_garl.scenarios.genome_like import genome_like
 from pytest_garl.scenarios.groups import QUANTITIES
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.quantities import Quantity
-from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.scenario import MARKER_PLACE, Scenario
 from pytest_garl.scenarios.story import STORY
 from pytest_garl.scenarios.validity import repair
 
-MARKER_PLACE = ("marker.x", "marker.y")
-"""Keys of the marker's place; objects that repeat their moves do not follow another place."""
 Simplification = Callable[[Scenario], Scenario]
 
 

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_garl.cases.simplification import MARKER_PLACE
 from pytest_garl.flight.flight import Flight, ObjectRecord
 from pytest_garl.scenarios.bodies import Disc, discs_of
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import BIRD_HEIGHTS_M, OBJECT_TYPES, ObjectType
 from pytest_garl.scenarios.placed import Placed, start_genes
-from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.scenario import MARKER_PLACE, Scenario
 from pytest_garl.scenarios.story import GRADES, STORY, with_all_values
 from pytest_garl.scenarios.units import HEIGHT, PLACE_DIGITS
 from pytest_garl.scenarios.validity import problems, repair

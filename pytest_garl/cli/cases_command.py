@@ -295,9 +295,8 @@ def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
         say(f"{file}: {result.reason} ({spent}); it stays as it is")
         return
     path = replace_file(file, result.case, project.maps)
-    evidence = result.case.evidence
     renewed = result.case.id == case.id
-    done = "its evidence is renewed" if renewed else f"removed {evidence.removed} in all"
+    done = "its evidence is renewed" if renewed else f"removed in all {result.case.removed}"
     say(f"{path}: {done} ({spent})")
 
 

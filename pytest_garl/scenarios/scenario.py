@@ -10,6 +10,9 @@ from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.groups import QUANTITIES
 from pytest_garl.scenarios.task import Task
 
+MARKER_PLACE = ("marker.x", "marker.y")
+"""Keys of the marker's place in its disc; both are 0 in the middle, which is nominal."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
@@ -49,6 +52,11 @@ class Scenario:
     def get(self, key: str, default: float) -> float:
         """Return the value of a property, or ``default`` where the genome lacks it."""
         return next((value for name, value in self.genes if name == key), default)
+
+    @property
+    def has_moved_marker(self) -> bool:
+        """Whether the marker is not at its nominal place."""
+        return any(self.get(key, 0.0) != 0 for key in MARKER_PLACE)
 
     def replace(self, values: Mapping[str, float]) -> Scenario:
         """Return a copy in which the named properties have other values."""

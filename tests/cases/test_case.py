@@ -106,3 +106,32 @@ def test_a_case_that_was_not_shrunk_is_not_said_to_have_lost_nothing() -> None:
     unflown = dataclasses.replace(nothing, neighbours=0, neighbours_failed=0)
     assert dataclasses.replace(tried, evidence=unflown).shrinking == "not shrunk"
     assert case().shrinking == "shrinking removed 3 of 4 objects"
+
+
+@pytest.mark.parametrize(
+    ("removed", "marker_x", "text"),
+    [
+        ("1 of 1 object, 1 of 2 conditions", 0.3, ", not the marker's place"),
+        ("1 of 1 object, 1 of 2 conditions (4 of 5 values)", -0.3, ", not the marker's place"),
+        # It was the marker's place.
+        ("1 of 2 conditions", 0.0, ""),
+        ("1 of 1 object", 0.3, ""),
+        ("nothing", 0.3, ""),
+        ("what was in the way", 0.3, ""),
+    ],
+)
+def test_the_marker_s_place_is_named_if_it_is_a_condition_that_is_left(
+    removed: str, marker_x: float, text: str
+) -> None:
+    """Else "1 of 2 conditions" would contradict "nothing unusual"."""
+    sample = case("II:never-seen")
+    place = {"marker.x": marker_x, "marker.y": 0.0}
+    subject = dataclasses.replace(
+        sample,
+        severity=Severity(about="conditions"),
+        evidence=dataclasses.replace(sample.evidence, removed=removed),
+        scenario=sample.scenario.replace(place),
+    )
+    assert subject.severity.text == "nothing unusual"
+    assert subject.removed == f"{removed}{text}"
+    assert subject.shrinking == f"shrinking removed {subject.removed}"

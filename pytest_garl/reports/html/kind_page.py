@@ -240,7 +240,7 @@ def _facts(plan: KindPlan) -> tuple[Fact, ...]:
         ("Robustness", case.robustness if case else ""),
         ("Preventable?", case.prevention.text if case else ""),
         ("Why it gates nothing", NO_GATE_TEXTS[case.reason] if case and case.reason else ""),
-        ("Shrinking removed", case.evidence.removed if case and case.is_shrunk else ""),
+        ("Shrinking removed", case.removed if case and case.is_shrunk else ""),
         ("Saved case", _status(plan.saved) if plan.saved else "none in this project"),
     )
 
