@@ -54,6 +54,31 @@ def test_list_names_new_cases_until_they_are_accepted(file: Path) -> None:
     assert "garl cases accept" not in garl("list").output
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("pytest.ini", "[pytest]\ngarl_cases = kept\n"),
+        ("pyproject.toml", '[tool.pytest.ini_options]\ngarl_cases = "kept"\n'),
+    ],
+)
+def test_commands_look_into_the_folder_that_pytest_s_settings_name(
+    file: Path, name: str, text: str
+) -> None:
+    Path("scenarios/regressions").rename("kept")
+    assert garl("list").output.startswith("no cases in scenarios/regressions")
+    Path(name).write_text(text)
+    listed = garl("list").output
+    assert file.stem in listed
+    assert "garl cases accept kept/" in listed
+    assert garl("check").exit_code == 0
+    Path("empty").mkdir()
+    assert garl("--folder=empty", "list").output.startswith("no cases in empty")
+    Path(name).write_text(text.replace("[", "(", 1))
+    broken = garl("list")
+    assert broken.exit_code == 1
+    assert broken.output.startswith(f"Error: {name}: ")
+
+
 def test_show_omits_neighbours_if_none_was_flown(file: Path) -> None:
     case = load_case(file)
     evidence = dataclasses.replace(case.evidence, neighbours=0, neighbours_failed=0)
