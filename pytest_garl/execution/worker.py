@@ -180,10 +180,11 @@ class Worker:
         try:
             with closing(WorkQueue.open(self._path, self._owner)) as queue:
                 return self._claim(queue)
-        except GarlError:
+        except Exception:
             if not self._system:
                 raise
-            # The landing system may be the reason. If not, a fresh process meets the same error.
+            # The landing system may be the reason, whatever the error: it may have replaced
+            # sqlite3.connect. If it is not, a fresh process meets the same error.
             return None
 
     def _claim(self, queue: WorkQueue) -> Claim | None:

@@ -171,6 +171,14 @@ class SavesNothing(Good):
         return Land()
 
 
+class OpensNoDatabase(Good):
+    """Takes away what opens the ledger."""
+
+    def step(self, observation: Observation) -> Land:
+        vars(sqlite3)["connect"] = None
+        return Land()
+
+
 class Floods(Good):
     """Says 200 MB."""
 
