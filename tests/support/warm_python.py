@@ -4,6 +4,7 @@
 tests.  A server, which is this file as a script, imports once and forks a run for each command.
 Such a run is a process of its own: its folder, environment, arguments and files are its own, and
 nothing of it reaches another run or a test.  The server forks the workers of a run's xdist, too.
+A run forks a spare process before it does anything else; if it has flights judged, the spare does.
 
 A run differs from a fresh interpreter in what was imported before, in its parent, and in the seed
 of hashes, which all runs of a server share.  A command whose environment differs in what an
@@ -13,6 +14,7 @@ interpreter reads at its start gets a fresh one: ``COLD`` is such a difference.
 from __future__ import annotations
 
 import atexit
+import fcntl
 import gc
 import importlib
 import json
@@ -49,6 +51,7 @@ READ_AT_START = ("PYTHON", "LC_", "LANG")
 COLD = {"PYTHONHASHSEED": "random"}
 """What the environment of a command has that must not be forked."""
 GARL = "from pytest_garl.cli import main"
+JUDGE = ["-m", "pytest_garl.execution.judge_process"]
 XDIST = ["-u", "-c", "import sys;exec(eval(sys.stdin.readline()))"]
 LONGEST_MESSAGE = 2**20
 
@@ -57,6 +60,7 @@ class WarmPopen(subprocess.Popen[Any]):
     """``subprocess.Popen``, which has the server fork Python if that is to run pytest or garl."""
 
     server: ClassVar[Server | None] = None
+    spare: ClassVar[Spare | None] = None
     environment: ClassVar[Mapping[str, str]] = dict(os.environ)
     """The server's, which starts in a test that may have changed its own."""
     _is_warm = False
@@ -66,22 +70,28 @@ class WarmPopen(subprocess.Popen[Any]):
         args, executable, preexec_fn, _, pass_fds, cwd, env = given[:7]
         files, start_new_session = given[10:16], given[21]
         environment = dict(os.environ if env is None else env)
+        standard = [
+            number if file == -1 else file
+            for number, file in enumerate((files[0], files[3], files[5]))
+        ]
+
+        def request() -> dict[str, Any]:
+            return {
+                "command": [os.fspath(each) for each in args],
+                "folder": str(Path(cwd or ".").absolute()),
+                "environment": environment,
+            }
+
         plain = not (executable or preexec_fn or pass_fds or start_new_session)
-        if not (plain and _imports_much(args) and self._server().is_found_in(environment)):
+        if plain and _imports_much(args) and self._server().is_found_in(environment):
+            self._is_warm = True
+            self.pid = self._server().start(request(), standard)
+        elif self.spare and _judges(args) and self.spare.is_found_in(environment):
+            self.pid = self.spare.start(request(), standard, pass_fds)
+        else:
             start: Any = super()
             start._execute_child(*given)
             return
-        request = {
-            "command": [os.fspath(each) for each in args],
-            "folder": str(Path(cwd or ".").absolute()),
-            "environment": environment,
-        }
-        p2cread, _, _, c2pwrite, _, errwrite = files
-        standard = enumerate((p2cread, c2pwrite, errwrite))
-        self._is_warm = True
-        self.pid = self._server().start(
-            request, [number if file == -1 else file for number, file in standard]
-        )
         self._child_created = True
         close: Any = self
         close._close_pipe_fds(*files)
@@ -107,11 +117,23 @@ class WarmPopen(subprocess.Popen[Any]):
         return cls.server
 
 
+def _words(command: Any) -> list[str]:
+    """Return the first arguments of a command that is Python."""
+    if isinstance(command, str | bytes | os.PathLike) or command[0] != sys.executable:
+        return []
+    return [os.fspath(each) for each in command[1:4]]
+
+
+def _judges(command: Any) -> bool:
+    """Whether a command is Python that judges flights for a run."""
+    return _words(command)[:2] == JUDGE
+
+
 def _imports_much(command: Any) -> bool:
     """Whether a command is Python that runs pytest, garl or a worker of xdist."""
-    if isinstance(command, str | bytes | os.PathLike) or command[0] != sys.executable:
+    words = _words(command)
+    if not words:
         return False
-    words = [os.fspath(each) for each in command[1:4]]
     if words[0] == "-c":
         return GARL in words[1]
     return words[0] == "-mpytest" or words[:2] == ["-m", "pytest"] or words == XDIST
@@ -169,6 +191,60 @@ class Server:
         if "ended" in answer:
             self._statuses[answer["ended"]] = answer["status"]
         return answer
+
+
+class Spare:
+    """A process that a run has forked before it does anything, for the first judge it starts.
+
+    The run is its parent, as of any process that it starts.
+    """
+
+    def __init__(self) -> None:
+        self._connection, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._read_at_start = _read_at_start(os.environ)
+        self._is_started = False
+        self.request: dict[str, Any] | None = None
+        """In the spare process: what it runs."""
+        self.pid = os.fork()
+        if self.pid == 0:
+            self._connection.close()
+            self._wait(theirs)
+        theirs.close()
+
+    def is_found_in(self, environment: Mapping[str, str]) -> bool:
+        """Whether it is left, and an interpreter would read from the environment what it has."""
+        return not self._is_started and _read_at_start(environment) == self._read_at_start
+
+    def start(self, request: Mapping[str, Any], files: Sequence[int], passed: Sequence[int]) -> int:
+        """Have it run a command with these files, in a session of its own; return its id."""
+        self._is_started = True
+        text = json.dumps({**request, "files": [0, 1, 2, *passed]}).encode()
+        socket.send_fds(self._connection, [text], [*files, *passed])
+        self._connection.close()
+        return self.pid
+
+    def _wait(self, connection: socket.socket) -> None:
+        """Wait for the request, deaf and mute; end if the run has ended without one."""
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        nothing = os.open(os.devnull, os.O_RDWR)
+        for number in (0, 1, 2):
+            os.dup2(nothing, number)
+        os.close(nothing)
+        text, files, _, _ = socket.recv_fds(connection, LONGEST_MESSAGE, 8)
+        connection.close()
+        if not text:
+            os._exit(0)
+        os.setsid()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        self.request = request = json.loads(text)
+        # First out of the way: the number of one may be that which another gets.
+        above = 1 + max(request["files"])
+        moved = [fcntl.fcntl(file, fcntl.F_DUPFD, above) for file in files]
+        for file in files:
+            os.close(file)
+        for file, number in zip(moved, request["files"], strict=True):
+            os.dup2(file, number)
+            os.close(file)
 
 
 def _read_at_start(environment: Mapping[str, str]) -> dict[str, str]:
@@ -303,11 +379,17 @@ def main() -> None:
     if forked is None:
         return
     request, connection = forked
-    if any(word.startswith("-n") for word in request["command"]):
-        WarmPopen.server = Server(connection, os.environ)
-        vars(subprocess)["Popen"] = WarmPopen
-    else:
+    spare = Spare()
+    if spare.request:
         connection.close()
+        # What runs as a script was imported, by pytest's finder, which knows no scripts.
+        sys.modules.pop(JUDGE[1], None)
+        sys.meta_path[:] = [each for each in sys.meta_path if isinstance(each, type)]
+        run(spare.request, path)
+        return
+    WarmPopen.spare = spare
+    vars(subprocess)["Popen"] = WarmPopen
+    WarmPopen.server = Server(connection, os.environ)
     run(request, path)
 
 
