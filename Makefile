@@ -66,17 +66,20 @@ experiment-smoke: $(READY)  ## fly, measure and report an experiment at toy size
 clean:  ## remove the virtual environment and the run folder
 	rm -rf $(VENV) .garl
 
+# Nothing is compiled that is never imported: pip would compile for half a minute.
 # What flies needs neither PyTorch nor a linter.
 $(FLIES): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e .
 	touch $@
 
-$(READY): $(FLIES)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,train]'
-	touch $@
+# Not after $(FLIES): pip installs all in one go.
+$(READY): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '.[dev,train]'
+	touch $(FLIES) $@
 
 # Only the tests of clusters need Ray.
 $(CLUSTERS): $(READY)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,train,ray]'
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '.[dev,train,ray]'
 	touch $@
