@@ -27,14 +27,13 @@ from pytest_garl.cases.case import (
 )
 from pytest_garl.cases.case_header import (
     HEADER_KEYS,
-    CaseHeader,
     header_lines,
     read_header,
 )
 from pytest_garl.errors import ScenarioError
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.files.bounded_files import read_text
-from pytest_garl.files.toml import Table, finite, parse, quoted
+from pytest_garl.files.toml import Table, finite, parse_table, quoted
 from pytest_garl.messages import printable, shown
 from pytest_garl.scenarios.files import SCENARIO_KEYS, is_in_units, read_scenario, scenario_lines
 from pytest_garl.scenarios.genes import ENVIRONMENT
@@ -76,12 +75,6 @@ def load_case(path: Path, map_folders: tuple[Path, ...] = ()) -> Case:
     return parse_case(read_text(path), lambda name: load_map(name, map_folders), source=str(path))
 
 
-def load_header(path: Path) -> CaseHeader:
-    """Return the facts above a file's first table, in a fraction of the time of the whole case."""
-    header, _, _ = read_text(path).partition("\n[")
-    return read_header(Table(parse(header, str(path)), str(path)))
-
-
 def dump_case(case: Case, load_map: Callable[[str], Map] = load_map) -> str:
     """Return the case as TOML: the same bytes for equal cases."""
     map = load_map(case.scenario.map)
@@ -105,7 +98,7 @@ def dump_case(case: Case, load_map: Callable[[str], Map] = load_map) -> str:
 
 def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case") -> Case:
     """Return the case in ``text``; raise ScenarioError that names source and key."""
-    top = Table(parse(text, source), source)
+    top = parse_table(text, source)
     header = read_header(top)
     top.refuse_unknown(HEADER_KEYS | _SECTIONS | {*SCENARIO_KEYS})
     try:

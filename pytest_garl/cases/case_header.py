@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import textwrap
 from dataclasses import dataclass
+from pathlib import Path
 from typing import cast, get_args
 
 from pytest_garl.cases.case import Case, NoGateReason, Status, asserting_test
 from pytest_garl.execution.reference import SYSTEM_NAME
-from pytest_garl.files.toml import Table, quoted
+from pytest_garl.files.bounded_files import read_text
+from pytest_garl.files.toml import Table, parse_table, quoted
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.files import absent_line
 from pytest_garl.scenarios.maps.map import Map
@@ -55,6 +57,13 @@ def header_lines(case: Case, map: Map) -> list[str]:
     if case.assertion:
         lines.append(f"assertion = {quoted(case.assertion)}")
     return [*lines, *absent_line(scenario, map)]
+
+
+def load_header(path: Path) -> CaseHeader:
+    """Return the facts above a file's first table, in a fraction of the time of the whole case."""
+    text, _, _ = read_text(path).partition("\n[")
+    top = parse_table(text, str(path))
+    return read_header(top)
 
 
 def read_header(top: Table) -> CaseHeader:

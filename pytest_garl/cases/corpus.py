@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.cases.case import Case
-from pytest_garl.cases.case_file import dump_case, load_case, load_header
-from pytest_garl.cases.case_header import CaseHeader
+from pytest_garl.cases.case_file import dump_case, load_case
+from pytest_garl.cases.case_header import CaseHeader, load_header
 from pytest_garl.cases.shrunk_cause import cause_of_case
 from pytest_garl.cases.worst import worst_in
 from pytest_garl.errors import CorpusError, ScenarioError
@@ -25,15 +25,14 @@ from pytest_garl.scenarios.maps.loading import load_map
 class CorpusEntry:
     """One file of the corpus.
 
-    ``header`` is enough to collect tests; the rest of the file is read when ``case`` or ``problem``
-    is asked for.
+    ``header`` is enough to collect tests.  Each part of the file is read when it is asked for.
     """
 
     path: Path
     changed_ns: int
     map_folders: tuple[Path, ...]
-    header: CaseHeader | None
-    header_problem: str = ""
+    lost: str = ""
+    """Why there is no file; empty if there is one."""
 
     @property
     def name(self) -> str:
@@ -50,10 +49,25 @@ class CorpusEntry:
         """The problem of the file, with source, key and expected value; empty for a good file."""
         return self._content[1]
 
+    @property
+    def header(self) -> CaseHeader | None:
+        """The facts above the first table, or None if something is wrong with them."""
+        return self._head[0]
+
+    @functools.cached_property
+    def _head(self) -> tuple[CaseHeader | None, str]:
+        if self.lost:
+            return None, self.lost
+        try:
+            return load_header(self.path), ""
+        except ScenarioError as error:
+            return None, str(error)
+
     @functools.cached_property
     def _content(self) -> tuple[Case | None, str]:
-        if self.header_problem:
-            return None, self.header_problem
+        header, problem = self._head
+        if header is None:
+            return None, problem
         try:
             return load_case(self.path, self.map_folders), ""
         except ScenarioError as error:
@@ -205,7 +219,9 @@ class Corpus:
     def _read(self, path: Path, changed_ns: int) -> CorpusEntry:
         known = self._entries.get(path)
         if known is None or known.changed_ns != changed_ns:
-            known = self._entries[path] = _read(path, changed_ns, self.map_folders)
+            known = self._entries[path] = CorpusEntry(
+                path=path, changed_ns=changed_ns, map_folders=self.map_folders
+            )
         return known
 
 
@@ -250,29 +266,13 @@ def patch_of(path: Path, root: Path, text: str) -> str:
     return f"diff --git a/{name} b/{name}\nnew file mode 100644\n{''.join(body)}"
 
 
-def _read(path: Path, changed_ns: int, map_folders: tuple[Path, ...]) -> CorpusEntry:
-    try:
-        header, problem = load_header(path), ""
-    except ScenarioError as error:
-        header, problem = None, str(error)
-    return CorpusEntry(
-        path=path,
-        changed_ns=changed_ns,
-        map_folders=map_folders,
-        header=header,
-        header_problem=problem,
-    )
-
-
 def _lost(path: Path, reason: str) -> CorpusEntry:
     """Return an entry for a symbolic link without a file: a case may be lost."""
     problem = (
         f"{path}: cannot be read: found a symbolic link that leads nowhere ({reason}), expected "
         "a file; remove it, or restore what it points to"
     )
-    return CorpusEntry(
-        path=path, changed_ns=0, map_folders=(), header=None, header_problem=printable(problem)
-    )
+    return CorpusEntry(path=path, changed_ns=0, map_folders=(), lost=printable(problem))
 
 
 def _failure(case: Case) -> tuple[object, ...]:

@@ -28,7 +28,6 @@ FLYING = (
     "execution.fly_and_judge",
     "execution.severity_of_flight",
     "scenarios.files",
-    "scenarios.maps.map_file",
     "flight.flight_file",
     "simulation.fly",
     "simulation.system_under_test.reference_pilot",

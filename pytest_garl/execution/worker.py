@@ -49,7 +49,7 @@ SIMULATOR = "the simulator"
 """The failed component, in the message of an error that ends the run."""
 _JUDGING = (
     "execution.severity_of_flight",
-    "scenarios.maps.map_file",
+    "scenarios.maps.loading",
     "flight.flight_file",
     "verdicts.judge",
 )

@@ -56,8 +56,7 @@ class Table:
     """One TOML table with its file and its path of keys, which the error messages name."""
 
     def __init__(self, values: Any, source: str, path: str = "") -> None:
-        self.source = printable(source, keep="")
-        self.path = path
+        self.source, self.path = source, path
         if not isinstance(values, Mapping):
             raise self.error("", f"found {shown(values)}, expected a table")
         self.values: Mapping[str, Any] = values
@@ -65,7 +64,7 @@ class Table:
     def error(self, key: str, problem: str) -> ScenarioError:
         """Return an error about a key of this table."""
         where = ".".join(part for part in (self.path, key) if part)
-        return ScenarioError(f"{self.source}: key {shown(where)}: {problem}")
+        return ScenarioError(f"{printable(self.source, keep='')}: key {shown(where)}: {problem}")
 
     def refuse_unknown(self, known: Collection[str]) -> None:
         """Raise an error for a key that is not in ``known``."""
@@ -204,6 +203,12 @@ class Table:
                 key, f"found {shown(value)}, expected a number from {low:g} to {high:g}"
             )
         return number
+
+
+def parse_table(text: str, source: str) -> Table:
+    """Return the document as its top table; raise ScenarioError with the line for bad TOML."""
+    values = parse(text, source)
+    return Table(values, source)
 
 
 def quoted(value: str) -> str:

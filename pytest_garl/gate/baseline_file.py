@@ -11,7 +11,7 @@ from pytest_garl.cases.case_file import read_limits
 from pytest_garl.errors import BaselineError, GarlError, ScenarioError
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.files.bounded_files import MEGABYTE, read_text
-from pytest_garl.files.toml import Table, parse, quoted
+from pytest_garl.files.toml import Table, parse_table, quoted
 from pytest_garl.gate.pairs import FlightSummary
 from pytest_garl.gate.rows import RowReader, is_sparse, listed_genes, row_text
 from pytest_garl.messages import shown
@@ -157,7 +157,7 @@ def parse_baseline(
     text: str, load_map: Callable[[str], Map], *, source: str = "baseline"
 ) -> Baseline:
     """Return the baseline in ``text``; raise ScenarioError that names source and key."""
-    top = Table(parse(text, source), source)
+    top = parse_table(text, source)
     top.refuse_unknown({"schema", "cpu", "versions", "set"})
     if top.integer("schema") != SCHEMA:
         raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")

@@ -9,7 +9,7 @@ from pathlib import Path
 from pytest_garl.errors import ScenarioError
 from pytest_garl.files.bounded_files import read_text
 from pytest_garl.files.json_values import dataclass_from, parse_json
-from pytest_garl.files.toml import Table, parse, quoted
+from pytest_garl.files.toml import Table, parse_table, quoted
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.genome_like import genome_like
 from pytest_garl.scenarios.groups import GROUPS, QUANTITIES
@@ -85,7 +85,7 @@ def _gene_lines(scenario: Scenario) -> list[str]:
 
 def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
     """Return the scenario in ``text``; raise ScenarioError that names source and key."""
-    top = Table(parse(text, source), source)
+    top = parse_table(text, source)
     top.refuse_unknown({"schema", "map", "seed", *SCENARIO_KEYS})
     if top.integer("schema") != SCHEMA:
         raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
@@ -191,7 +191,7 @@ def _read_genes(top: Table, map: Map) -> Scenario:
 
 def map_name_in(text: str, *, source: str = "scenario") -> str:
     """Return the name of the map that a scenario file wants."""
-    return Table(parse(text, source), source).string("map")
+    return parse_table(text, source).string("map")
 
 
 def load(path: Path, search_path: tuple[Path, ...] = ()) -> Scenario:

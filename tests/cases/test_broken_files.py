@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.cases.case_file import dump_case, load_case, load_header, parse_case
+from pytest_garl.cases.case_file import dump_case, load_case, parse_case
+from pytest_garl.cases.case_header import load_header
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.maps.loading import load_map
 from tests.cases.samples import SYSTEM, case

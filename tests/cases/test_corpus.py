@@ -65,7 +65,8 @@ def test_corpus_reads_each_file_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
         read.append(path.name)
         return real(path)
 
-    monkeypatch.setattr("pytest_garl.cases.case_file.read_text", counted)
+    for module in ("case_header", "case_file"):
+        monkeypatch.setattr(f"pytest_garl.cases.{module}.read_text", counted)
     for _ in range(3):
         assert corpus.entries(SYSTEM)[0].case == case()
         assert [*corpus.expected_signatures(SYSTEM, "lawn")] == [case().violation.signature]

@@ -11,7 +11,7 @@ from typing import cast, get_args
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.files.bounded_files import read_text
-from pytest_garl.files.toml import Table, parse
+from pytest_garl.files.toml import Table, parse_table
 from pytest_garl.messages import listed, shown
 from pytest_garl.scenarios.domains.domain import ABSENT, BIRD_HEIGHT, CONDITIONS, ELEVATION, Domain
 from pytest_garl.scenarios.domains.names import BUILT_IN
@@ -46,7 +46,8 @@ def _read(file: Path, source: str, name: str, above: tuple[str, ...]) -> Domain:
     place = str(file.resolve())
     if place in above:
         raise ScenarioError(f"{source}: key 'extends': found a circle of files, expected an end")
-    top = Table(parse(read_text(file), source), source)
+    text = read_text(file)
+    top = parse_table(text, source)
     top.refuse_unknown({"extends", "npc_behaviour", "paper", *_SECTIONS})
     base: Domain | None = None
     if "extends" in top.values:
