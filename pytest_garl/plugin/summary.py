@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -24,10 +24,10 @@ from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import counted, width_of, wrapped
 from pytest_garl.reports.run_record import KindRecord, RunRecord, SearchRecord
 from pytest_garl.reports.run_text import (
+    LEGEND,
     headline_shares,
     in_control_text,
     kinds_lines,
-    legend,
     share_lines,
 )
 
@@ -139,6 +139,12 @@ def _lines_about(record: RunRecord, run: Run, tally: Tally, reporter: Any) -> li
     )
     lines += [wrapped(world, width, others="  ") for world in worlds]
     return [*lines, f"ledger: {record.ledger}  results {record.results_sha256[:16]}"]
+
+
+def legend(kinds: Iterable[KindRecord]) -> str:
+    """Return the meanings of the types of these kinds, in one line."""
+    types = {kind.type for kind in kinds}
+    return "; ".join(f"{name}: {meaning}" for name, meaning in LEGEND.items() if name in types)
 
 
 def _not_finished(record: RunRecord, run: Run, tally: Tally) -> list[str]:

@@ -7,7 +7,6 @@ violation takes.  Shrinking finds out, so only a kind with a shrunk case has a c
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 
 from pytest_garl.cases.case import Case
 from pytest_garl.execution.severity import Severity
@@ -119,17 +118,3 @@ def _ending(signature: str) -> str:
         ending = _ENDINGS.get(f"{kind}:{parts[0]}", _ENDINGS_OF_TYPE.get(kind, ""))
     phase = next((_PHASES[part] for part in parts[1:] if part in _PHASES), "")
     return f"{ending} {phase}".strip() if ending else ""
-
-
-def counted_causes(cases: Sequence[Case | None]) -> str:
-    """Return how many causes kinds have: ``4 causes``, ``5 of them shrunk, with 3 causes``.
-
-    ``cases`` are those of the kinds, None for a kind whose cause nobody knows; empty if there is
-    none.
-    """
-    known = [case for case in cases if case is not None]
-    if not known:
-        return ""
-    number = len({cause_of(case.severity) for case in known})
-    causes = f"{number} cause{'' if number == 1 else 's'}"
-    return causes if len(known) == len(cases) else f"{len(known)} of them shrunk, with {causes}"

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pytest_garl.messages import command
-from pytest_garl.reports.causes import counted_causes
 from pytest_garl.reports.control_arm import LEAST_FLIGHTS, ControlArm
 from pytest_garl.reports.run_record import WHY_NO_LANDING, KindRecord, RunRecord, SearchRecord
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
-from pytest_garl.verdicts.wording import decided_text
 
 PAPER_DEFINITION = "by the paper's definition, which counts not landing"
 """How texts call the paper's definition: its type II is "no landing occurs"."""
@@ -97,7 +95,8 @@ def share_lines(search: SearchRecord) -> list[str]:
         f"{PAPER_DEFINITION}: violations {paper}{found}",
         _no_landing(search),
         _landings(search),
-        decided_text(search.verdicts),
+        f"distance decided in {search.decided('distance')} of {search.flown} flights, "
+        f"time in {search.decided('time')}",
         *(f"limits: {limits_text(each)}" for each in search.limits if each != DEFAULT_LIMITS),
     ]
 
@@ -105,12 +104,25 @@ def share_lines(search: SearchRecord) -> list[str]:
 def kinds_lines(search: SearchRecord) -> list[str]:
     """Return how diverse the violations are, and what random flights found beside the search."""
     number, effective = len(search.kinds), search.effective_kinds
-    known = counted_causes([kind.case for kind in search.kinds])
+    known = counted_causes(search.kinds)
     causes = f", {known}" if known else ""
     diverse = (
         f"{number} kinds of violation{causes}, as diverse as {effective:.1f} equally frequent ones"
     )
     return [text for text in (diverse if number > 1 else "", control_text(search)) if text]
+
+
+def counted_causes(kinds: Sequence[KindRecord]) -> str:
+    """Return how many causes kinds have: ``4 causes``, ``5 of them shrunk, with 3 causes``.
+
+    It is empty if no cause is known.
+    """
+    known = [kind.cause for kind in kinds if kind.cause is not None]
+    if not known:
+        return ""
+    number = len(set(known))
+    causes = f"{number} cause{'' if number == 1 else 's'}"
+    return causes if len(known) == len(kinds) else f"{len(known)} of them shrunk, with {causes}"
 
 
 def control_text(search: SearchRecord) -> str:
@@ -190,9 +202,3 @@ def _found(mean: float, between: tuple[int, int], whole: bool) -> str:
         return f"found {between[0]} {'kind' if between[0] == 1 else 'kinds'}"
     low, high = between
     return f"find {mean:.1f} on average, {low} to {high} in 95 % of picks"
-
-
-def legend(kinds: Iterable[KindRecord]) -> str:
-    """Return the meanings of the types of these kinds, in one line."""
-    types = {kind.type for kind in kinds}
-    return "; ".join(f"{name}: {meaning}" for name, meaning in LEGEND.items() if name in types)

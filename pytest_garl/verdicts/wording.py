@@ -1,12 +1,9 @@
-"""Text for reports: a flight in half a line, what flights decided, compass points."""
+"""Text for reports: a flight in half a line, compass points."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-
-from pytest_garl.verdicts.verdict import Verdict, count_decided
 
 _WHERE = re.compile(
     r"(?P<what>.*?)\.?\s+At (?P<when>[\d.]+) s the UAV was (?P<where>.+?)\.(?: In the last .*)?",
@@ -57,14 +54,6 @@ def headline(description: str) -> str:
     # The place is that of what happened, not of what had been before.
     happened, mark, before = what.partition("; ")
     return f"{happened[:1].lower()}{happened[1:]}{where}{mark}{before}"
-
-
-def decided_text(verdicts: Sequence[Verdict]) -> str:
-    """Return such as ``distance decided in 4 of 60 flights, time in 12``."""
-    return (
-        f"distance decided in {count_decided(verdicts, 'distance')} of {len(verdicts)} flights, "
-        f"time in {count_decided(verdicts, 'time')}"
-    )
 
 
 def compass_point(east_m: float, north_m: float) -> str:

@@ -6,7 +6,6 @@ import pytest
 
 from pytest_garl.errors import OptionError
 from pytest_garl.verdicts.verdict import Limits, Margin, Verdict, count_decided, default_distance_m
-from pytest_garl.verdicts.wording import decided_text
 
 
 def verdict(violation: bool) -> Verdict:
@@ -32,7 +31,6 @@ def test_decided_properties_are_counted_over_flights() -> None:
     # A flight whose process died has no margins at all.
     flights = [flown(True, True), flown(False, True), flown(False, False), verdict(False)]
     assert (count_decided(flights, "distance"), count_decided(flights, "time")) == (1, 2)
-    assert decided_text(flights) == "distance decided in 1 of 4 flights, time in 2"
 
 
 @pytest.mark.parametrize("value", [300.001, -1.0, float("nan"), float("inf"), "120", True])

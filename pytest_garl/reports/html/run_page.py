@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pytest_garl.reports.causes import counted_causes
 from pytest_garl.reports.html.kind_page import Fact, KindPage, KindPlan
 from pytest_garl.reports.html.naming import still_address
 from pytest_garl.reports.run_record import (
@@ -18,6 +17,7 @@ from pytest_garl.reports.run_record import (
 from pytest_garl.reports.run_text import (
     LEGEND,
     PAPER_DEFINITION,
+    counted_causes,
     counts_text,
     in_control_text,
     kinds_lines,
@@ -74,7 +74,7 @@ def title(run: RunRecord) -> str:
     if not run.violating:
         return f"{who}: no violation in {run.flown} flights"
     ways = "one way" if len(run.kinds) == 1 else f"{len(run.kinds)} ways"
-    causes = counted_causes([kind.case for kind in run.kinds])
+    causes = counted_causes(run.kinds)
     with_causes = f", {causes}" if causes else ""
     return (
         f"{who}: {run.violating} of {run.flown} flights violate something, in {ways}{with_causes}"
