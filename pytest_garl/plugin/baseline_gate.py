@@ -43,6 +43,9 @@ def register(config: pytest.Config, options: Options) -> None:
 class BaselineGateItem(pytest.Item):
     """Flies one set of the baseline and fails if the landing system is worse."""
 
+    fixturenames: tuple[str, ...] = ()
+    """Hooks of projects ask every item for it."""
+
     def __init__(self, *, target: Target, base: BaselineSet, **rest: Any) -> None:
         super().__init__(**rest)
         self.garl_gate = base

@@ -54,6 +54,17 @@ def saved(pytester: pytest.Pytester, template: Path) -> pytest.Pytester:
     return pytester
 
 
+def test_a_hook_may_ask_the_gate_for_its_fixtures(saved: pytest.Pytester) -> None:
+    with (saved.path / "conftest.py").open("a") as conftest:
+        conftest.write(
+            "\ndef pytest_collection_modifyitems(items):\n"
+            "    assert not [item for item in items if 'database' in item.fixturenames]\n"
+        )
+    result = run(saved, *GATE, "--collect-only", "-q")
+    assert result.ret == pytest.ExitCode.OK
+    result.stdout.fnmatch_lines(["*::baseline[[]Good-lawn]"])
+
+
 def test_unchanged_system_passes_with_the_same_flights(saved: pytest.Pytester) -> None:
     result = run(saved)
     result.assert_outcomes(passed=1, skipped=3)
