@@ -17,6 +17,7 @@ from pytest_garl.cases.case import Case
 from pytest_garl.cases.case_file import dump_case
 from pytest_garl.cases.corpus import folder_of
 from pytest_garl.errors import GarlError
+from pytest_garl.execution.flight_id import LIVE, OF_CASE
 from pytest_garl.files.atomic import write_text_atomically
 
 CASE_NAME = "judged"
@@ -86,7 +87,8 @@ def single_case_corpus(case: Case, *, live: bool) -> Iterator[Path]:
 def pytest_arguments(case: Case, folder: Path, *, live: bool) -> list[str]:
     """Return pytest's arguments that select the tests of the case in ``folder``."""
     file = case.test.partition("::")[0] if "::" in case.test else ""
-    ids = f"case-{CASE_NAME}-live" if live else f"case-{CASE_NAME} and not case-{CASE_NAME}-live"
+    name = f"{OF_CASE}{CASE_NAME}"
+    ids = f"{name}{LIVE}" if live else f"{name} and not {name}{LIVE}"
     return [
         *filter(None, [file]),
         *("-k", ids, "--maxfail=0", "--garl-workers=1"),

@@ -30,6 +30,7 @@ from pytest_garl.cli.case_tables import (
 from pytest_garl.cli.pytest_settings import find_settings
 from pytest_garl.cli.shared import FOLDER, say
 from pytest_garl.errors import CorpusError, GarlError
+from pytest_garl.files.run_files import RUN_FOLDER
 from pytest_garl.messages import command, printable
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ class _Project:
 
     def proved(self, case: Case) -> Case:
         """Return a case with the reference that the latest run here proved."""
-        folder = str(find_settings(self.root).values.get("garl_dir") or ".garl")
+        folder = str(find_settings(self.root).values.get("garl_dir") or RUN_FOLDER)
         return Proofs(self.root / folder).renewed(case)
 
     def collected(self) -> tuple[ProjectTests, Corpus]:

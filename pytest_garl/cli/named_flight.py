@@ -13,9 +13,10 @@ from pytest_garl.cases.replay import Replay, replay, system_of
 from pytest_garl.cli.check_command import imported_system
 from pytest_garl.cli.shared import LEDGER, say
 from pytest_garl.errors import GarlError, LedgerError
-from pytest_garl.execution.flight_id import FIRST_SLOT
+from pytest_garl.execution.flight_id import FIRST_SLOT, LIVE, OF_CASE
 from pytest_garl.execution.stored_ledger import checked_ledger, flown_slots
 from pytest_garl.files.bounded_files import read_text
+from pytest_garl.files.run_files import REPEAT_LEDGER
 from pytest_garl.files.toml import parse
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
@@ -31,14 +32,10 @@ from pytest_garl.scenarios.placed import Placed
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
-REPEATED = "repeat.sqlite"
-"""The ledger of ``--garl-repeat``, beside that of the run."""
 RECORD, CASE = ".npz", ".toml"
 _MAPS = (Path("scenarios/maps"),)
 _SLOT = re.compile(r".+-g\d{2,}-s\d{2,}")
 """A slot as pytest names it, also with the first digits of its search's key before it."""
-_ITEM, _LIVE = "case-", "-live"
-"""What the ids of items put before a case's name, and behind it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +79,7 @@ class FlightName:
             return self._of_case(_case_file(file), live=False, pictures=pictures)
         if _SLOT.fullmatch(self.flight):
             return self._of_slot()
-        live = self.flight.endswith(_LIVE)
+        live = self.flight.endswith(LIVE)
         return self._of_case(self._case_named(), live=live, pictures=pictures)
 
     def _of_slot(self) -> NamedFlight:
@@ -191,7 +188,7 @@ class FlightName:
         near = {
             path.absolute(): path
             for folder in (run, LEDGER.parent)
-            for path in (folder / LEDGER.name, folder / REPEATED)
+            for path in (folder / LEDGER.name, folder / REPEAT_LEDGER)
         }
         for path in [self.ledger] if self.ledger is not None else near.values():
             if not sha256 or not path.is_file():
@@ -212,7 +209,7 @@ class FlightName:
 
     def _case_named(self) -> Path:
         """Return the file of the case with this name, as pytest or `garl cases list` prints it."""
-        wanted = self.flight.removesuffix(_LIVE).removeprefix(_ITEM).rpartition("/")[2]
+        wanted = self.flight.removesuffix(LIVE).removeprefix(OF_CASE).rpartition("/")[2]
         entries = Corpus(self.folder, _MAPS).all_entries()
         found = [entry.path for entry in entries if entry.name == wanted]
         if len(found) == 1:
@@ -241,7 +238,7 @@ def flown_again(
         raise GarlError(f"{file}: {NO_RECORD}; `{replay}` says how it ends")
     other = " (another flight than the saved one)" if replayed.same_flight is False else ""
     return NamedFlight(
-        name=f"{case.id}{_LIVE if live else ''}",
+        name=f"{case.id}{LIVE if live else ''}",
         flight=replayed.flight,
         signature=replayed.signature,
         limits=case.limits,
@@ -293,7 +290,7 @@ def _how_to_fly_again(slot: str, ledger: Path) -> str:
     where = () if ledger.parent == LEDGER.parent else ("-o", f"garl_dir={ledger.parent}")
     repeat = command("pytest", f"--garl-repeat={slot}", *where)
     return f" To fly it again: {repeat}, then name {slot} with " + command(
-        f"--ledger={ledger.with_name(REPEATED)}"
+        f"--ledger={ledger.with_name(REPEAT_LEDGER)}"
     )
 
 
@@ -309,6 +306,6 @@ def _case_file(file: Path) -> Path:
         raise GarlError(
             f"{file}: found no evidence of a flight, expected a saved case. If it is a scenario, "
             f"fly it first: {command('pytest', f'--garl-repeat={file}')}, then name {slot} with "
-            f"--ledger={LEDGER.with_name(REPEATED)}"
+            f"--ledger={LEDGER.with_name(REPEAT_LEDGER)}"
         )
     return file

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from pytest_garl.cases.corpus import Corpus
-from pytest_garl.cli.shared import FOLDER
+from pytest_garl.cli.shared import FOLDER, LEDGER
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.messages import printable
 from pytest_garl.reports.html import MOST_FILMS
@@ -21,7 +21,7 @@ from pytest_garl.reports.run_text import run_text
 @click.argument(
     "ledger",
     type=click.Path(path_type=Path, dir_okay=False),
-    default=Path(".garl/ledger.sqlite"),
+    default=LEDGER,
 )
 @click.argument("later", type=click.Path(path_type=Path, dir_okay=False), required=False)
 @click.option(

@@ -7,22 +7,22 @@ from pathlib import Path
 import click
 
 from pytest_garl.cli.pytest_settings import find_settings
+from pytest_garl.files.run_files import CASES_FOLDER, RUN_FOLDER, SEARCH_LEDGER
 from pytest_garl.messages import printable
 
-DEFAULT_FOLDER = "scenarios/regressions"
-LEDGER = Path(".garl/ledger.sqlite")
+LEDGER = Path(RUN_FOLDER, SEARCH_LEDGER)
 
 
 def folder_of_cases() -> Path:
     """Return the folder to which pytest saves cases if it is called here."""
-    return Path(str(find_settings(Path.cwd()).values.get("garl_cases") or DEFAULT_FOLDER))
+    return Path(str(find_settings(Path.cwd()).values.get("garl_cases") or CASES_FOLDER))
 
 
 FOLDER = click.option(
     "--folder",
     type=click.Path(path_type=Path, file_okay=False),
     default=folder_of_cases,
-    show_default=f"ini key garl_cases, or {DEFAULT_FOLDER}",
+    show_default=f"ini key garl_cases, or {CASES_FOLDER}",
     help="Folder of the cases.",
 )
 

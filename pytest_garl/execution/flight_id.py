@@ -13,6 +13,10 @@ KEY_DIGITS = 16
 NAME_DIGITS = 8
 """Digits of the key that a record's name repeats, to be short."""
 
+OF_CASE, LIVE = "case-", "-live"
+"""What an item's id puts before the name of a saved case, and behind it if the policy of the search
+moves the case's NPCs."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, order=True)
 class Slot:

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 
 import pytest
 
+from pytest_garl.files.run_files import CASES_FOLDER, RUN_FOLDER
 from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY, policy_names
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.search.method_catalogue import DEFAULT_METHOD, method_names
@@ -144,7 +145,6 @@ OPTIONS = (
     ),
 )
 
-DEFAULT_CASES = "scenarios/regressions"
 """The folder of the saved cases if the ini key names none."""
 
 
@@ -167,9 +167,9 @@ def add_options(parser: pytest.Parser) -> None:
         "must not have changed.",
     )
     parser.addini(
-        "garl_dir", help="Folder of the ledger and the records of flights.", default=".garl"
+        "garl_dir", help="Folder of the ledger and the records of flights.", default=RUN_FOLDER
     )
-    parser.addini("garl_cases", help=f"Folder of the saved cases (default: {DEFAULT_CASES}).")
+    parser.addini("garl_cases", help=f"Folder of the saved cases (default: {CASES_FOLDER}).")
     parser.addini(
         "garl_xfail_strict",
         help="Whether an open saved case that passes fails the run.",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pytest_garl.errors import GarlError
+from pytest_garl.execution.flight_id import OF_CASE
 from pytest_garl.messages import printable
 from pytest_garl.plugin.item_record import records
 from pytest_garl.plugin.run import FilmKey, Films, Run
@@ -108,7 +109,7 @@ def _failed_cases(reporter: Any, run: Run) -> Iterator[_Failure]:
     seen = set()
     for record in records(reporter, "failed"):
         name = record.slot or ""
-        if not name.startswith("case-") or name in seen:
+        if not name.startswith(OF_CASE) or name in seen:
             continue
         seen.add(name)
         sha256, signature = record.trajectory_sha256 or "", record.signature or ""

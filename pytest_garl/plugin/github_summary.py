@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from pytest_garl.execution.flight_id import OF_CASE
 from pytest_garl.plugin.item_record import ItemRecord
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import repeat_kind_command
@@ -150,7 +151,7 @@ def _failed_cases(reporter: Any) -> list[Row]:
     for report in reporter.getreports("failed"):
         record = ItemRecord.of(report)
         slot = record.slot or ""
-        if slot.startswith("case-"):
+        if slot.startswith(OF_CASE):
             headline, _, see_it = _message(report).partition("\n")
             command = see_it.partition(": ")[2]
             texts = (slot, record.signature or "", "1", headline, record.severity)

@@ -8,6 +8,7 @@ import pytest
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.cases.forecast import flight_times_with_shrinking, seconds_per_new_signature
+from pytest_garl.files.run_files import RUN_FOLDER, SEARCH_LEDGER
 from pytest_garl.messages import command
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
@@ -16,7 +17,7 @@ from pytest_garl.plugin.time_left import FIRST_FLIGHTS
 from pytest_garl.reports.run_text import limits_text
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
-_DEFAULT_LEDGER = ".garl/ledger.sqlite"
+_DEFAULT_LEDGER = f"{RUN_FOLDER}/{SEARCH_LEDGER}"
 
 
 def header(run: Run, config: pytest.Config) -> str:

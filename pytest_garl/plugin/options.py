@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import pytest
 
 from pytest_garl.errors import GarlError
+from pytest_garl.files.run_files import CASES_FOLDER, REPEAT_LEDGER, SEARCH_LEDGER
 from pytest_garl.npcs.domain_policy import domain_with_policy, policy_in
 from pytest_garl.npcs.policy_catalogue import policy_names
-from pytest_garl.plugin.arguments import DEFAULT_CASES, OPTIONS, Option
+from pytest_garl.plugin.arguments import OPTIONS, Option
 from pytest_garl.plugin.option_values import (
     among,
     filmed,
@@ -104,6 +105,16 @@ class Options:
         return (self.root / "scenarios" / "maps",)
 
     @property
+    def search_ledger(self) -> Path:
+        """The file of the ledger of a search."""
+        return self.folder / SEARCH_LEDGER
+
+    @property
+    def repeat_ledger(self) -> Path:
+        """The file of the ledger of a repeated scenario, which leaves that of the search alone."""
+        return self.folder / REPEAT_LEDGER
+
+    @property
     def flights(self) -> Path:
         """The folder of the flights' records."""
         return self.folder / "flights"
@@ -166,7 +177,7 @@ def read_options(config: pytest.Config) -> Options:
             config, "garl_unasserted", ("fail", "note"), "fail" if os.environ.get("CI") else "note"
         ),
         probes=_word(config, "garl_probes", ("first", "always", "never")),
-        cases=config.rootpath / str(config.getini("garl_cases") or DEFAULT_CASES),
+        cases=config.rootpath / str(config.getini("garl_cases") or CASES_FOLDER),
         cases_named=bool(config.getini("garl_cases")),
         folder=folder,
         root=config.rootpath,

@@ -50,7 +50,7 @@ def read_repeated(options: Options) -> Repeated:
         if match is None:
             return _in_file(options.repeat)
         slot = Slot(generation=int(match["generation"]), index=int(match["slot"]))
-        stored = read_slot(options.folder / "ledger.sqlite", match["map"], slot)
+        stored = read_slot(options.search_ledger, match["map"], slot)
         return Repeated(map=stored.map, stored=stored)
     except GarlError as error:
         raise pytest.UsageError(f"--garl-repeat={options.repeat}: {error}") from error

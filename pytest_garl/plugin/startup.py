@@ -75,7 +75,7 @@ def _open_ledger(config: pytest.Config, options: Options) -> tuple[Ledger, TextI
         return Ledger(path), None
     lock = _lock(path)
     # The earlier ledger makes room for the new one.
-    earlier_s = stored_flight_s(options.folder / "ledger.sqlite")
+    earlier_s = stored_flight_s(options.search_ledger)
     if options.resume:
         ledger = Ledger.resume(path, _facts(options))
         check_stored(ledger)
@@ -95,7 +95,7 @@ def _ledger_file(options: Options) -> Path:
     """
     if not options.searches_or_repeats:
         return options.folder / f"cases-{options.controller}.sqlite"
-    return options.folder / ("repeat.sqlite" if options.repeat else "ledger.sqlite")
+    return options.repeat_ledger if options.repeat else options.search_ledger
 
 
 def _facts(options: Options) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, Slot, search_key
+from pytest_garl.execution.flight_id import FIRST_SLOT, LIVE, OF_CASE, FlightId, Slot, search_key
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.task import DEFAULT_TASK, Task
@@ -55,7 +55,7 @@ class Target:
     def name(self) -> str:
         """The slot's id in the item's name."""
         if self.entry is not None:
-            return f"case-{self.entry.name}{'-live' if self.live else ''}"
+            return f"{OF_CASE}{self.entry.name}{LIVE if self.live else ''}"
         return f"file-{Path(self.file).stem}" if self.file else self.slot.id(self.map)
 
     @property

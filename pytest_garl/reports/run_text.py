@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from pytest_garl.files.run_files import RUN_FOLDER
 from pytest_garl.messages import command
 from pytest_garl.reports.control_arm import LEAST_FLIGHTS, ControlArm
 from pytest_garl.reports.run_record import WHY_NO_LANDING, KindRecord, RunRecord, SearchRecord
@@ -67,7 +68,7 @@ def repeat_command(run: RunRecord, search: SearchRecord, kind: KindRecord) -> st
     """Return the command that repeats the first flight of a kind, called beside the ledger."""
     folder = run.ledger.parent.name
     words = ["pytest", *search.key.files, f"--garl-repeat={kind.first}"]
-    return command(*words, *(() if folder == ".garl" else ("-o", f"garl_dir={folder}")))
+    return command(*words, *(() if folder == RUN_FOLDER else ("-o", f"garl_dir={folder}")))
 
 
 def counts_text(counts: Mapping[Any, int]) -> str:
