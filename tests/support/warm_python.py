@@ -26,7 +26,8 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from pkgutil import iter_modules
 from types import ModuleType
@@ -146,6 +147,11 @@ class Server:
         self._connection = connection
         self._read_at_start = _read_at_start(environment)
         self._statuses: dict[int, int] = {}
+        self._started: list[int] = []
+        self._starting = threading.Lock()
+        self._news = threading.Condition()
+        """Guards what was read, and whether a thread reads."""
+        self._is_read = False
 
     @classmethod
     def of_this_process(cls, environment: Mapping[str, str]) -> Self:
@@ -170,27 +176,48 @@ class Server:
 
     def start(self, request: Mapping[str, Any], files: Sequence[int]) -> int:
         """Fork a run with these files as 0, 1 and 2; return its process id."""
-        socket.send_fds(self._connection, [json.dumps(request).encode()], files)
-        while "started" not in (answer := self._next_answer()):
-            pass
-        return answer["started"]
+        with self._starting:
+            socket.send_fds(self._connection, [json.dumps(request).encode()], files)
+            self._read_until(lambda: bool(self._started))
+            return self._started.pop()
 
     def status_of(self, pid: int, flags: int) -> tuple[int, int]:
         """Return what ``os.waitpid`` would if the run were a child of this process."""
-        while pid not in self._statuses:
-            try:
-                self._next_answer(socket.MSG_DONTWAIT if flags & os.WNOHANG else 0)
-            except BlockingIOError:
-                return 0, 0
+        if not self._read_until(lambda: pid in self._statuses, waits=not flags & os.WNOHANG):
+            return 0, 0
         return pid, self._statuses[pid]
 
-    def _next_answer(self, flags: int = 0) -> dict[str, int]:
-        text = self._connection.recv(LONGEST_MESSAGE, flags)
+    def _read_until(self, has_come: Callable[[], bool], *, waits: bool = True) -> bool:
+        """Read answers until one has come; one thread reads for all, for it may read another's."""
+        with self._news:
+            while not has_come():
+                if self._is_read and not waits:
+                    return False
+                if self._is_read:
+                    self._news.wait()
+                    continue
+                self._is_read = True
+                self._news.release()
+                try:
+                    text = self._connection.recv(
+                        LONGEST_MESSAGE, 0 if waits else socket.MSG_DONTWAIT
+                    )
+                except BlockingIOError:
+                    return False
+                finally:
+                    self._news.acquire()
+                    self._is_read = False
+                    self._news.notify_all()
+                self._keep(text)
+        return True
+
+    def _keep(self, text: bytes) -> None:
         assert text, "the server of warm runs has ended"
         answer: dict[str, int] = json.loads(text)
-        if "ended" in answer:
+        if "started" in answer:
+            self._started.append(answer["started"])
+        else:
             self._statuses[answer["ended"]] = answer["status"]
-        return answer
 
 
 class Spare:
