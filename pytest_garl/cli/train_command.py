@@ -15,6 +15,7 @@ import click
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Airframe, airframe_of
+from pytest_garl.npcs.director import WAITING
 from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY
 from pytest_garl.npcs.training.presets import PRESETS, Preset, Reward, Uav
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
@@ -78,7 +79,9 @@ RECENT_EPISODES = 50
     help="The reward, instead of that of --policy.",
 )
 @click.option(
-    "--episodes", type=click.IntRange(1), default=800, show_default=True, help="Per training."
+    "--episodes",
+    type=click.IntRange(1),
+    help="Per training (default: 800; the director learns from each moment of 160 landings).",
 )
 @click.option(
     "--seeds",
@@ -120,6 +123,7 @@ def train(**options: Any) -> None:
     if options["out"].suffix != ".npz":
         raise GarlError(f"--out: found {str(options['out'])!r}, expected a name that ends in .npz")
     try:
+        from pytest_garl.npcs.training.director_training import train_director
         from pytest_garl.npcs.training.selection import train_best
     except ImportError as error:
         raise GarlError(
@@ -128,10 +132,15 @@ def train(**options: Any) -> None:
         ) from error
     cpu_dispatch.check()
     plan = _plan(options)
+    decides_when = plan.surrogate.state == WAITING
     with _Progress(plan) as progress:
-        result = train_best(plan, progress.on_episode, progress.on_validation)
+        if decides_when:
+            result = train_director(plan, progress.on_validation)
+        else:
+            result = train_best(plan, progress.on_episode, progress.on_validation)
     rates = ", ".join(f"seed {seed}: {100 * rate:.0f} %" for seed, rate in result.rates.items())
-    click.echo(f"collisions in {plan.validation} validation episodes: {rates}")
+    what = "reward" if decides_when else "collisions"
+    click.echo(f"{what} in {plan.validation} validation episodes: {rates}")
     click.echo(
         f"kept seed {result.best}: {100 * result.report.rate:.0f} % in {plan.validation} other "
         f"episodes; {plan.out} (with {plan.out.with_suffix('.json').name})"
@@ -165,7 +174,9 @@ def _plan(options: dict[str, Any]) -> TrainingPlan:
             airframe=_airframe(options["system"]),
             **overrides,
         ),
-        training=dataclasses.replace(preset.training, episodes=options["episodes"]),
+        training=dataclasses.replace(
+            preset.training, episodes=options["episodes"] or preset.training.episodes
+        ),
         seeds=tuple(range(options["seed"], options["seed"] + options["seeds"])),
         validation=options["validation"],
         folder=options["folder"],
@@ -259,7 +270,8 @@ class _Progress:
 
     def on_validation(self, seed: int, rate: float) -> None:
         """Show the result of a trained policy in validation."""
-        note = f"validated: collisions {100 * rate:.0f} %"
+        what = "reward" if self._plan.surrogate.state == WAITING else "collisions"
+        note = f"validated: {what} {100 * rate:.0f} %"
         done = self._plan.training.episodes
         if seed not in self._tasks:
             self._tasks[seed] = self._bar.add_task(f"seed {seed}", total=done, note="")

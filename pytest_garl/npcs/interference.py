@@ -169,6 +169,11 @@ class Interfering:
     def __init__(self, grade: str, mind: Mind) -> None:
         self.grade, self._mind = grade, mind
 
+    @property
+    def is_over(self) -> bool:
+        """Whether the NPC is leaving."""
+        return self._interference.is_over
+
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Read the story, or draw one."""
         self._interference = Interference(self.grade, situation, rng)

@@ -19,6 +19,7 @@ from pytest_garl.files.arrays import unpack
 from pytest_garl.files.bounded_files import MEGABYTE, read_bytes
 from pytest_garl.files.json_values import parse_json
 from pytest_garl.messages import listed, shown
+from pytest_garl.npcs.director import FEATURES, WAITING, LearnedDirector
 from pytest_garl.npcs.encodings import ENCODINGS, on_turn
 from pytest_garl.npcs.grades import GRADE_LIMITS
 from pytest_garl.npcs.interference import Belief, Interfering
@@ -27,6 +28,13 @@ from pytest_garl.simulation.npc_policy import STAY, Move, PolicySpec, Situation
 
 Array = NDArray[np.float64]
 FORMAT = 1
+SHAPES: Mapping[str, tuple[int, int]] = {
+    **{name: (each.size, each.actions) for name, each in ENCODINGS.items()},
+    WAITING: (len(FEATURES), 2),
+}
+"""How many inputs and actions a network has, by the name of its input."""
+DIRECTOR = WEIGHTS / "grades" / "director.npz"
+"""The weights of the director that ships."""
 _LARGEST = MEGABYTE
 """Bytes of weights, packed or not: two hundred times the shipped ones."""
 _REMEDY = "; train it again with `garl train`, or restore the file"
@@ -98,6 +106,20 @@ class LearnedInterfering(Interfering):
         super().__init__(grade, LearnedMind(weights, sha256))
 
 
+def learned_director(weights: Path = DIRECTOR, sha256: str = "") -> LearnedDirector:
+    """Return a director with weights of a file; without a hash the one in the manifest holds.
+
+    Raises PolicyError if the file is missing or damaged, or decides something else.
+    """
+    manifest = read_manifest(weights)
+    if manifest["state"] != WAITING:
+        raise _wrong(
+            weights,
+            f"has the state {shown(manifest['state'])}; expected {WAITING!r}, that of a director",
+        )
+    return LearnedDirector(network=_load(str(weights), sha256 or str(manifest["sha256"])))
+
+
 def learned_spec(name: str) -> PolicySpec:
     """Return the specification of a shipped policy, or of one in a file.
 
@@ -107,6 +129,11 @@ def learned_spec(name: str) -> PolicySpec:
     """
     path = _path(name)
     manifest = read_manifest(path)
+    if manifest["state"] == WAITING:
+        raise PolicyError(
+            f"NPC policy: {path} decides when NPCs begin, and moves none; expected weights with "
+            f"one of the states {', '.join(ENCODINGS)}"
+        )
     sha256 = str(manifest["sha256"])
     weights = name if path.parent == WEIGHTS else str(path.resolve())
     _load(weights, sha256)
@@ -169,9 +196,9 @@ def read_manifest(path: Path) -> dict[str, Any]:
     known = {"format", "state", "sha256"} <= manifest.keys()
     if not known or manifest["format"] != FORMAT:
         raise _wrong(file, f"is not a manifest of format {FORMAT}")
-    if str(manifest["state"]) not in ENCODINGS:
+    if str(manifest["state"]) not in SHAPES:
         state = shown(manifest["state"])
-        raise _wrong(file, f"names the state {state}; known: {', '.join(ENCODINGS)}")
+        raise _wrong(file, f"names the state {state}; known: {', '.join(SHAPES)}")
     return manifest
 
 
@@ -203,7 +230,7 @@ def _load(weights: str, sha256: str) -> Network:
 
 
 def _check(path: Path, layers: Sequence[tuple[Array, Array]], state: str) -> None:
-    size, actions = ENCODINGS[state].size, ENCODINGS[state].actions
+    size, actions = SHAPES[state]
     for weight, bias in layers:
         if weight.ndim != 2 or bias.shape != weight.shape[:1] or weight.shape[1] != size:
             raise _wrong(path, f"has a layer of shape {weight.shape} but {size} inputs")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.flight.flight import Outcome
+from pytest_garl.flight.flight import Flight, Outcome
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.bodies import discs_of
 from pytest_garl.scenarios.chromosome import decode
@@ -79,6 +79,11 @@ class Episode:
             return None
         body = self._loop.recorder.last_contact
         return body if body in self._names else None
+
+    @property
+    def record(self) -> Flight:
+        """The record so far, without hash and versions."""
+        return self._loop.recorder.flight(self.outcome or "inconclusive", None, ())
 
     def step(self, moves: Sequence[Move]) -> None:
         """Let the NPCs go where ``moves`` say until the next decision, or the end."""

@@ -50,7 +50,8 @@ class Surrogate:
     ``discount`` is part of the potential-based reward.  With ``environment`` "drawn" an episode
     begins in any weather and light of a search and with the marker anywhere; with "clear" it begins
     in clear weather with the marker at a fixed place.  With ``grades`` an NPC perceives the UAV
-    within the limits of one of them, drawn anew, and its episode begins in the air near the marker.
+    within the limits of one of them, drawn anew, and its episode begins in the air near the marker,
+    but for a share ``takes_off`` that begins with the take-off.
     """
 
     maps: tuple[Map, ...]
@@ -61,6 +62,7 @@ class Surrogate:
     discount: float = 0.99
     environment: Literal["clear", "drawn"] = "clear"
     grades: tuple[str, ...] = ()
+    takes_off: float = 0.0
     airframe: Airframe = field(default_factory=Airframe)
 
 
@@ -114,5 +116,18 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             training=Training(double=False, steps=1),
         ),
         **{name: _graded(name) for name in ("curious", "chasing")},
+        "director": Preset(
+            help="when NPCs that chase the UAV, or are curious, begin",
+            surrogate=Surrogate(
+                maps=(),
+                types=("person", "child", "dog", "bird"),
+                uav="both",
+                state="waiting",
+                # Most of what a director is worth lies in those that chase.
+                grades=("chasing", "chasing", "chasing", "curious"),
+                takes_off=0.25,
+            ),
+            training=Training(learning_rate=2e-3, discount=1.0, episodes=160, steps=1),
+        ),
     }
 )

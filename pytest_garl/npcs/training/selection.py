@@ -16,6 +16,7 @@ import numpy as np
 
 from pytest_garl.npcs.learned import Network, save
 from pytest_garl.npcs.training.checkpoint import identity_of, sources_sha256
+from pytest_garl.npcs.training.counterfactuals import COLLIDED, PREVENTABLE, WORTH
 from pytest_garl.npcs.training.dqn import EpisodeRecord
 from pytest_garl.npcs.training.presets import Surrogate, Training
 from pytest_garl.npcs.training.surrogate import env_of
@@ -61,8 +62,24 @@ class Score:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MomentScore:
+    """How landings end whose NPC begins when a director says so."""
+
+    episodes: int
+    collided: int
+    preventable: int
+
+    @property
+    def rate(self) -> float:
+        """The mean worth of a landing."""
+        others = self.collided - self.preventable
+        worth = WORTH[PREVENTABLE] * self.preventable + WORTH[COLLIDED] * others
+        return worth / self.episodes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrainingResult:
-    """The best seed, and collision rates.
+    """The best seed, and rates: of collisions, or the mean worth of a director's landings.
 
     ``rates`` has the rate of each seed in validation, ``report`` the score of the best seed on
     other episodes.
@@ -70,7 +87,7 @@ class TrainingResult:
 
     best: int
     rates: Mapping[int, float]
-    report: Score
+    report: Score | MomentScore
 
 
 def train_best(

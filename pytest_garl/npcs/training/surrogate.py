@@ -6,9 +6,7 @@ in which an NPC with a grade decides.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
-import math
 from typing import Any
 
 import gymnasium
@@ -16,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.npcs.encodings import ENCODINGS, LIMIT
-from pytest_garl.npcs.grades import GRADE_LIMITS
 from pytest_garl.npcs.interference import Belief, Interference
 from pytest_garl.npcs.training import rewards
 from pytest_garl.npcs.training.episode import Episode, draw_episode, in_any_environment
+from pytest_garl.npcs.training.graded_landing import draw_graded_landing
 from pytest_garl.npcs.training.presets import Surrogate
 from pytest_garl.npcs.training.uav_models import (
     AvoidanceParameters,
@@ -27,26 +25,11 @@ from pytest_garl.npcs.training.uav_models import (
     FlightStyle,
     StraightPilot,
 )
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.object_types import BIRD_HEIGHTS_M, OBJECT_TYPES
-from pytest_garl.scenarios.placed import Placed, start_genes
-from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.story import GRADES, LIMITS_S, with_all_values
-from pytest_garl.scenarios.task import Start
-from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.npc_policy import Move, Situation
 
 Observation = NDArray[np.float32]
-START_HEIGHTS_M = (3.0, 11.0)
-START_OFFSET_M = 4.0
-LATEST_COMING_S = 8.0
-"""An NPC comes at most so long after the start: a descent from 11 m takes 10 to 20 s."""
-SHORTEST_S = 0.3
-"""Share of its longest time that an NPC interferes at least."""
 AFTERMATH_STEPS = 3
 """Half seconds for which an episode goes on after the NPC's time: a collision may follow."""
-BEYOND_SIGHT_M = 2.0
-"""An NPC starts at most so much farther from the marker than it sees."""
 _TRIES = 100
 
 
@@ -188,20 +171,11 @@ class GradedEnv(OneNpcEnv):
         return self._state, reward, not goes_on, False, self._info()
 
     def _begin(self) -> None:
-        rng, surrogate = self.np_random, self.surrogate
-        map = surrogate.maps[int(rng.integers(len(surrogate.maps)))]
-        type_name = surrogate.types[int(rng.integers(len(surrogate.types)))]
-        grade = surrogate.grades[int(rng.integers(len(surrogate.grades)))]
-        height = float(rng.uniform(*START_HEIGHTS_M))
-        scenario, place = draw_episode(map, [type_name], rng)
-        scenario = _with_story(scenario, place, grade, height, rng)
-        style = dataclasses.replace(FlightStyle.drawn(rng), cruise_m=height, begins_in_air=True)
-        pilot: Any = functools.partial(StraightPilot, style)
-        if rng.random() < {"straight": 0.0, "both": 0.5, "avoiding": 1.0}[surrogate.uav]:
-            pilot = functools.partial(AvoidingPilot, style, AvoidanceParameters.drawn(rng))
-        pilot.airframe = surrogate.airframe
-        self._episode = Episode(scenario, place, pilot)
-        self._interference = Interference(grade, self._episode.situations[0], rng)
+        landing = draw_graded_landing(self.surrogate, self.np_random)
+        self._episode = landing.begin()
+        self._interference = Interference(
+            landing.grade, self._episode.situations[0], self.np_random
+        )
         self._first = True
 
     def _fly_to_decision(self) -> bool:
@@ -233,38 +207,3 @@ class GradedEnv(OneNpcEnv):
 def env_of(surrogate: Surrogate) -> GradedEnv | SurrogateEnv:
     """Return the environment of a surrogate."""
     return GradedEnv(surrogate) if surrogate.grades else SurrogateEnv(surrogate)
-
-
-def _near(scenario: Scenario, map: Map, name: str, grade: str) -> tuple[float, float]:
-    """Return the start of an NPC, moved to where it soon perceives a UAV above the marker."""
-    placed = Placed(scenario, map)
-    (x, y), (mx, my) = placed.npc(name).start_m, placed.marker_m
-    away = math.dist((x, y), (mx, my))
-    share = min(1.0, (GRADE_LIMITS[grade].sees_within_m + BEYOND_SIGHT_M) / max(away, 1e-6))
-    return mx + share * (x - mx), my + share * (y - my)
-
-
-def _with_story(
-    scenario: Scenario, map: Map, grade: str, height_m: float, rng: np.random.Generator
-) -> Scenario:
-    """Return the scenario with a drawn story of its NPC, and a start in the air."""
-    name, kind = map.present_objects[0]
-    values = {
-        "grade": float(GRADES.index(grade)),
-        "delay_s": float(rng.uniform(0, LATEST_COMING_S)),
-        "lasts_s": LIMITS_S[grade] * float(rng.uniform(SHORTEST_S, 1.0)),
-    }
-    genes = dict(scenario.genes) | with_all_values(values, name, kind)
-    genes |= start_genes(name, _near(scenario, map, name, grade), map)
-    if OBJECT_TYPES[kind].flies:
-        bird_m = float(rng.uniform(BIRD_HEIGHTS_M[0], height_m))
-        genes[f"{name}.height_m"] = bird_m
-        genes[f"{name}.stoop_m"] = float(rng.choice([0.0, rng.uniform(0, bird_m)]))
-    angle, offset = rng.uniform(0, 2 * math.pi), float(rng.uniform(0, START_OFFSET_M))
-    start = Start(
-        mode="hover",
-        height_m=height_m,
-        offset_m=(offset * math.cos(angle), offset * math.sin(angle)),
-    )
-    task = dataclasses.replace(scenario.task, start=start)
-    return repair(dataclasses.replace(scenario, genes=tuple(genes.items()), task=task), map)

@@ -22,6 +22,9 @@ from pytest_garl.simulation.system_under_test.descent import (
 )
 from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthObject, TruthPilot
 
+MOST_CAUTIOUS_M = 3.0
+"""No UAV takes notice of an NPC that is farther away horizontally."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightStyle:
@@ -63,7 +66,7 @@ class AvoidanceParameters:
     def drawn(cls, rng: np.random.Generator) -> AvoidanceParameters:
         """Draw random parameters, because those of a landing system are unknown."""
         return cls(
-            radius_m=float(rng.uniform(1.5, 3.0)),
+            radius_m=float(rng.uniform(1.5, MOST_CAUTIOUS_M)),
             below_m=float(rng.uniform(2.5, 6.0)),
             delay_s=float(rng.uniform(0.1, 0.8)),
             clear_s=float(rng.uniform(0.5, 2.0)),

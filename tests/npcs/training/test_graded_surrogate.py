@@ -13,11 +13,10 @@ from gymnasium.utils.env_checker import check_env
 
 from pytest_garl.npcs.minds import Intercepting
 from pytest_garl.npcs.training.episode import draw_episode
+from pytest_garl.npcs.training.graded_landing import LATEST_COMING_S, with_story
 from pytest_garl.npcs.training.presets import PRESETS
 from pytest_garl.npcs.training.surrogate import (
-    LATEST_COMING_S,
     GradedEnv,
-    _with_story,
     env_of,
 )
 from pytest_garl.scenarios.story import LIMITS_S, story_of
@@ -84,7 +83,7 @@ def test_a_surrogate_with_grades_has_their_environment() -> None:
 @pytest.mark.parametrize("kind", ["person", "child", "dog", "bird"])
 def test_each_npc_of_the_surrogate_has_the_drawn_story(kind: str) -> None:
     scenario, place = draw_episode(COURT[0], [kind], np.random.default_rng(0))
-    told = _with_story(scenario, place, "chasing", 8.0, np.random.default_rng(1))
+    told = with_story(scenario, place, "chasing", 8.0, np.random.default_rng(1))
     story = story_of(told, f"{kind}-1")
     assert story is not None
     assert story.grade == "chasing"

@@ -14,5 +14,10 @@ def test_each_shipped_learned_policy_has_the_preset_of_its_training() -> None:
         manifest = read_manifest(folder / f"{name}.npz")
         assert manifest["state"] == preset.surrogate.state
         assert manifest["surrogate"]["uav"] == preset.surrogate.uav
+        if name == "director":
+            # It learns from tables, by no reward on the way.
+            assert manifest["surrogate"]["takes_off"] == preset.surrogate.takes_off
+            assert manifest["training"]["episodes"] == preset.training.episodes
+            continue
         assert manifest["surrogate"]["reward"] == preset.surrogate.reward
         assert manifest["training"]["steps"] == preset.training.steps

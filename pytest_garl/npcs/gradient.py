@@ -1,0 +1,232 @@
+"""Learning in NumPy: the gradient of a Q-network, Adam, and double Q-learning from kept decisions.
+
+It runs where nobody has installed torch: on the machine of whoever searches.  One thread, double
+precision and a seed of its own: the same rows give the same bytes on every CPU, within what
+:mod:`pytest_garl.cpu_dispatch` pins.  Torch's gradient is the same within rounding, and a test
+holds that.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.npcs.learned import Array, Network
+
+Layers = tuple[tuple[Array, Array], ...]
+Numbers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Decisions:
+    """Decisions and what followed, one in a row: what a network learns from.
+
+    ``states`` and ``afters`` (n, inputs) are the inputs at a decision and at the next one,
+    ``actions`` (n,) what was chosen, ``rewards`` (n,) what that was worth, and ``goes_on`` (n,) the
+    discount of what follows, 0 if nothing does.
+    """
+
+    states: Array
+    actions: Numbers
+    rewards: Array
+    afters: Array
+    goes_on: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QLearning:
+    """The settings of double Q-learning (van Hasselt et al. 2016) from kept decisions."""
+
+    seed: int = 0
+    updates: int = 4000
+    batch: int = 64
+    learning_rate: float = 1e-3
+    target_every: int = 200
+    """Updates after which the target network becomes a copy of the network."""
+
+
+def untrained(state: str, sizes: Sequence[int], seed: int) -> Network:
+    """Return a network with random weights, as torch draws them: ±1/√inputs.
+
+    ``state`` is the name of its input, ``sizes`` the number of inputs, of hidden units, of actions.
+    """
+    rng = np.random.default_rng(seed)
+    layers = []
+    for inputs, outputs in itertools.pairwise(sizes):
+        bound = 1 / math.sqrt(inputs)
+        layers.append(
+            (rng.uniform(-bound, bound, (outputs, inputs)), rng.uniform(-bound, bound, outputs))
+        )
+    return Network(state=state, layers=tuple(layers))
+
+
+def values_of(layers: Layers, states: Array) -> Array:
+    """Return the values of each action for many states, (n, actions)."""
+    return _signals(layers, states)[-1]
+
+
+def _signals(layers: Layers, states: Array) -> list[Array]:
+    """Return the input of each layer, and the last one's output."""
+    signals = [states]
+    for weight, bias in layers[:-1]:
+        signals.append(np.maximum(signals[-1] @ weight.T + bias, 0.0))
+    weight, bias = layers[-1]
+    return [*signals, signals[-1] @ weight.T + bias]
+
+
+def loss_and_gradient(
+    layers: Layers, states: Array, actions: Numbers, expected: Array
+) -> tuple[float, Layers]:
+    """Return the mean Huber loss of the chosen actions' values, and its gradient.
+
+    The loss of a difference d is d²/2 up to 1 and |d| - 1/2 beyond.
+    """
+    signals, rows = _signals(layers, states), np.arange(len(states))
+    difference = signals[-1][rows, actions] - expected
+    size = np.abs(difference)
+    loss = np.where(size < 1, difference**2 / 2, size - 0.5).mean()
+    slope = np.zeros_like(signals[-1])
+    slope[rows, actions] = np.clip(difference, -1.0, 1.0) / len(states)
+    return float(loss), _backwards(layers, signals, slope)
+
+
+def _backwards(layers: Layers, signals: Sequence[Array], slope: Array) -> Layers:
+    """Return the gradient of the weights for the slope of the loss at the output, (n, actions)."""
+    gradient: list[tuple[Array, Array]] = []
+    for signal, (weight, _) in zip(reversed(signals[:-1]), reversed(layers), strict=True):
+        gradient.append((slope.T @ signal, slope.sum(axis=0)))
+        # The signal is what ReLU let through: where it is 0 nothing follows from the weights.
+        slope = (slope @ weight) * (signal > 0)
+    return tuple(reversed(gradient))
+
+
+class Adam:
+    """Adam (Kingma and Ba 2015) with the usual constants."""
+
+    def __init__(self, layers: Layers, learning_rate: float) -> None:
+        self._rate, self._steps = learning_rate, 0
+        self._means, self._squares = (
+            [np.zeros_like(part) for layer in layers for part in layer] for _ in range(2)
+        )
+
+    def step(self, layers: Layers, gradient: Layers) -> Layers:
+        """Return the weights after one step."""
+        self._steps += 1
+        first, second = 1 - 0.9**self._steps, 1 - 0.999**self._steps
+        parts = []
+        weights = [part for layer in layers for part in layer]
+        slopes = [part for layer in gradient for part in layer]
+        for index, (part, slope) in enumerate(zip(weights, slopes, strict=True)):
+            self._means[index] = 0.9 * self._means[index] + 0.1 * slope
+            self._squares[index] = 0.999 * self._squares[index] + 0.001 * slope * slope
+            size = np.sqrt(self._squares[index] / second) + 1e-8
+            parts.append(part - self._rate * (self._means[index] / first) / size)
+        return tuple(zip(parts[::2], parts[1::2], strict=True))
+
+
+def learned_from(network: Network, decisions: Decisions, settings: QLearning) -> Network:
+    """Return the network after double Q-learning from decisions."""
+    rng = np.random.default_rng(settings.seed)
+    layers = target = network.layers
+    adam = Adam(layers, settings.learning_rate)
+    for number in range(settings.updates):
+        if number % settings.target_every == 0:
+            target = layers
+        chosen = rng.integers(len(decisions.actions), size=settings.batch)
+        afters = decisions.afters[chosen]
+        best = values_of(layers, afters).argmax(axis=1)
+        follows = values_of(target, afters)[np.arange(len(best)), best]
+        expected = decisions.rewards[chosen] + decisions.goes_on[chosen] * follows
+        _, gradient = loss_and_gradient(
+            layers, decisions.states[chosen], decisions.actions[chosen], expected
+        )
+        layers = adam.step(layers, gradient)
+    return Network(state=network.state, layers=layers)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stopping:
+    """One thing that waits, with what each of its decisions is worth.
+
+    ``states`` (n, inputs) are the inputs at its decisions, ``go`` (n,) what to go at each is worth,
+    and ``never`` what never to go is worth.
+    """
+
+    states: Array
+    go: Array
+    never: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoppingRate:
+    """The settings of learning when to go.
+
+    ``imitates`` steps begin with the decisions of a rule, the ``steps`` after them follow the
+    gradient of the expected worth.  A network that has imitated for long is so sure that it learns
+    nothing more.  ``shrinks`` is the weight of the squared weights.
+    """
+
+    imitates: int = 40
+    steps: int = 300
+    learning_rate: float = 5e-3
+    shrinks: float = 1e-3
+
+
+def learned_when_to_go(
+    network: Network, things: Sequence[Stopping], rule: Array, settings: StoppingRate
+) -> Network:
+    """Return the network after learning when to go.
+
+    At each decision a thing goes with the probability σ(go - wait).  As every decision's worth is
+    known, so is the expected worth of each thing, J, and its gradient, without a sample:
+    ∂J/∂(go - wait) = S p (1 - p) (worth of go - expected worth of waiting), where S is the
+    probability that the thing still waits.  ``rule`` (n,) says for all decisions in a row whether a
+    rule goes: from there learning starts.
+    """
+    layers = network.layers
+    adam = Adam(layers, settings.learning_rate)
+    states = np.concatenate([each.states for each in things])
+    table = _StoppingTable(things)
+    for step in range(settings.imitates + settings.steps):
+        signals = _signals(layers, states)
+        goes = 1 / (1 + np.exp(np.clip(signals[-1][:, 0] - signals[-1][:, 1], -50, 50)))
+        # At first that of the cross-entropy between the rule and the network.
+        imitates = step < settings.imitates
+        slope = (goes - rule) / len(rule) if imitates else table.slope(goes)
+        gradient = _backwards(layers, signals, np.stack([-slope, slope], axis=1))
+        gradient = tuple(
+            (of_weight + settings.shrinks * weight, of_bias)
+            for (of_weight, of_bias), (weight, _) in zip(gradient, layers, strict=True)
+        )
+        layers = adam.step(layers, gradient)
+    return Network(state=network.state, layers=layers)
+
+
+class _StoppingTable:
+    """The decisions of many things side by side: a row for each, padded at its end."""
+
+    def __init__(self, things: Sequence[Stopping]) -> None:
+        longest, count = max(len(each.go) for each in things), len(things)
+        self._go, self._is_one = np.zeros((count, longest)), np.zeros((count, longest), dtype=bool)
+        self._never = np.array([each.never for each in things])
+        for row, each in enumerate(things):
+            self._go[row, : len(each.go)], self._is_one[row, : len(each.go)] = each.go, True
+
+    def slope(self, goes: Array) -> Array:
+        """Return by how much the mean loss grows with each decision's go - wait, (n,)."""
+        count, longest = self._go.shape
+        share = np.zeros((count, longest))
+        share[self._is_one] = goes
+        waiting = np.empty((count, longest + 1))
+        waiting[:, longest] = self._never
+        for column in range(longest - 1, -1, -1):
+            part = share[:, column]
+            waiting[:, column] = part * self._go[:, column] + (1 - part) * waiting[:, column + 1]
+        still = np.cumprod(np.concatenate([np.ones((count, 1)), 1 - share[:, :-1]], axis=1), axis=1)
+        gain: Array = still * share * (1 - share) * (self._go - waiting[:, 1:])
+        return np.asarray(-gain[self._is_one] / count, dtype=np.float64)
