@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import html
 import json
 import re
 import shutil
@@ -16,15 +17,18 @@ import pytest
 from pytest_garl.cases.corpus import Corpus
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.reference import Reference
+from pytest_garl.execution.severity import Severity
 from pytest_garl.flight.flight import Crash
 from pytest_garl.reports.html.index_markdown import index_parts
 from pytest_garl.reports.html.moments import moments_of, telling_moment
 from pytest_garl.reports.html.report import WrittenReport, write_html_report
 from pytest_garl.reports.run_reading import read_run
+from pytest_garl.reports.run_record import SavedCase
 from pytest_garl.verdicts.evidence import Evidence
+from tests.cases.samples import case
 from tests.reports.html.test_rendering import HOSTILE, Elements
 from tests.support.ffmpeg import hide_encoders
-from tests.support.report_ledgers import Flown, write_ledger
+from tests.support.report_ledgers import SYSTEM, Flown, write_ledger
 from tests.support.results import flight_result
 from tests.support.videos import Video
 
@@ -90,6 +94,25 @@ def test_a_report_has_an_index_and_a_page_for_each_kind(run: Path) -> None:
     assert "Not landed; the marker was last readable at 1.0 s." in found[kind]
     assert "--garl-repeat=lawn-g00-s01" in found[kind]
     assert data_of(found[kind])["scene"]["ground"].startswith("data:image/jpeg")
+
+
+def test_what_shrinking_removed_agrees_with_what_the_page_says_it_took(run: Path) -> None:
+    found = read_run(run / ".garl" / "ledger.sqlite", Corpus(run / "none"), checked=True)
+    sample = case(SIGNATURE)
+    shrunk = dataclasses.replace(
+        sample,
+        system=SYSTEM,
+        scenario=sample.scenario.replace({"marker.x": 0.5}),
+        severity=Severity(about="conditions"),
+        evidence=dataclasses.replace(sample.evidence, removed="1 of 2 conditions"),
+    )
+    saved = SavedCase(path=Path("a.toml"), case=shrunk, known=False)
+    searches = tuple(each.with_cases([saved]) for each in found.searches)
+    told = dataclasses.replace(found, searches=searches, cases=(saved,))
+    write_html_report(told, run / "report", films=0)
+    page = html.unescape(kind_page(run))
+    assert "nothing unusual" in page
+    assert "1 of 2 conditions, not the marker's place" in page
 
 
 def test_the_same_ledger_gives_the_same_bytes(run: Path) -> None:
