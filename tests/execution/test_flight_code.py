@@ -15,39 +15,41 @@ from pytest_garl.execution.sources import code_sha256, flown_modules
 
 
 def fresh() -> str:
-    """Hash this package; within a process that is done once."""
+    """Hash the package; within a process that is done once."""
     sources.flight_code_sha256.cache_clear()
     return sources.flight_code_sha256()
 
 
+@pytest.fixture(scope="module")
+def here() -> str:
+    """Return the hash of this package."""
+    return fresh()
+
+
 @pytest.fixture
-def copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def copy(here: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Return a copy of this package that is hashed in its place."""
     home = Path(sources.__file__).parents[1]
     shutil.copytree(
         home, tmp_path / "pytest_garl", ignore=shutil.ignore_patterns("__pycache__", "*.npz")
     )
-    here = fresh()
     assert re.fullmatch("[0-9a-f]{64}", here)
     monkeypatch.setattr(sources, "_HOME", tmp_path / "pytest_garl")
-    assert fresh() == here
     yield tmp_path / "pytest_garl"
     sources.flight_code_sha256.cache_clear()
 
 
-def test_comments_docstrings_and_layout_do_not_matter(copy: Path) -> None:
-    before = fresh()
+def test_comments_docstrings_and_layout_do_not_matter(copy: Path, here: str) -> None:
     path = copy / "simulation" / "loop.py"
     text = path.read_text()
     assert text.startswith('"""')
     path.write_text('"""Another docstring."""\n\n# A comment.\n\n\n' + text.partition('"""\n')[2])
-    assert fresh() == before
+    assert fresh() == here
     path.write_text(text + "\nEXTRA = 1\n")
-    assert fresh() != before
+    assert fresh() != here
 
 
-def test_what_flies_and_judges_no_case_does_not_matter(copy: Path) -> None:
-    before = fresh()
+def test_what_flies_and_judges_no_case_does_not_matter(copy: Path, here: str) -> None:
     for file in (
         "__init__.py",
         "messages.py",
@@ -61,15 +63,14 @@ def test_what_flies_and_judges_no_case_does_not_matter(copy: Path) -> None:
     ):
         path = copy / file
         path.write_text(path.read_text() + "\nEXTRA = 1\n")
-    assert fresh() == before
+    assert fresh() == here
 
 
 @pytest.mark.parametrize("file", ["verdicts/margins.py", "simulation/physics/unit_ball.obj"])
-def test_what_flies_or_judges_a_case_matters(copy: Path, file: str) -> None:
-    before = fresh()
+def test_what_flies_or_judges_a_case_matters(copy: Path, here: str, file: str) -> None:
     path = copy / file
     path.write_text(path.read_text() + "\nEXTRA = 1\n")
-    assert fresh() != before
+    assert fresh() != here
 
 
 def test_physics_camera_recorded_moves_and_verdicts_fly_and_judge() -> None:

@@ -294,6 +294,8 @@ def import_all() -> None:
         for name in [*late, *IMPORTED_LATE]:
             importlib.import_module(name)
         config._ensure_unconfigure()
+    # A run with saved cases asks for this hash of the package, which takes longer than its flights.
+    importlib.import_module("pytest_garl.execution.sources").flight_code_sha256()
     gc.collect()
     # A run need not look at what was made here whenever it collects.
     gc.freeze()
