@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -34,13 +36,32 @@ def phases(flight: Flight) -> list[str]:
     return [name for name, before in zip(names, ["", *names], strict=False) if name != before]
 
 
+@pytest.fixture(scope="module")
+def undisturbed() -> Callable[[type], Flight]:
+    """Return a function that flies a landing system where nothing is in its way, once."""
+
+    @functools.cache
+    def flown(system: type) -> Flight:
+        map, scenario = place(marker__x=0.3, marker__y=-0.4)
+        return fly(scenario, system, policy_spec("stationary"), map=map)
+
+    return flown
+
+
 @pytest.mark.parametrize("system", [TphYoloLandingSystem, MultiModuleLandingSystem])
-def test_it_lands_on_the_marker_where_nothing_is_in_the_way(system: type) -> None:
-    map, scenario = place(marker__x=0.3, marker__y=-0.4)
-    flight = fly(scenario, system, policy_spec("stationary"), map=map)
+def test_it_lands_on_the_marker_where_nothing_is_in_the_way(
+    system: type, undisturbed: Callable[[type], Flight]
+) -> None:
+    flight = undisturbed(system)
     assert flight.outcome == "landed"
     assert flight.final_distance_m < 0.3
     assert phases(flight)[-2:] == ["descend", "commit"]
+
+
+def test_mm_shows_its_planned_path(undisturbed: Callable[[type], Flight]) -> None:
+    flight = undisturbed(MultiModuleLandingSystem)
+    planned = [step.diagnostics.planned_path_m for step in flight.steps if step.diagnostics]
+    assert max(len(path) for path in planned) > 5
 
 
 def test_mm_gives_way_to_a_person_on_the_marker() -> None:
@@ -51,13 +72,6 @@ def test_mm_gives_way_to_a_person_on_the_marker() -> None:
     near = np.linalg.norm(flight.uav.position_m[:, :2] - flight.marker_position_m, axis=1) < 1.0
     airborne = flight.uav.time_s > 10.0
     assert flight.uav.position_m[near & airborne, 2].min() > 2.0
-
-
-def test_mm_shows_its_planned_path() -> None:
-    map, scenario = place()
-    flight = fly(scenario, MultiModuleLandingSystem, policy_spec("stationary"), map=map)
-    planned = [step.diagnostics.planned_path_m for step in flight.steps if step.diagnostics]
-    assert max(len(path) for path in planned) > 5
 
 
 def test_the_same_flight_has_the_same_bytes() -> None:
