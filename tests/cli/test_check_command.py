@@ -64,6 +64,19 @@ def test_other(landing):
 def test_without_flights():
     assert False
 """
+GIVES_UP = """
+import pytest
+from checked_stack import Climbs
+from pytest_garl import Abort, Start
+
+class GivesUp(Climbs):
+    def step(self, observation):
+        return Abort()
+
+@pytest.mark.garl(system=GivesUp, maps=["lawn"], start=Start(mode="hover", height_m=5.0))
+def test_gives_up(landing):
+    assert False
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -95,8 +108,9 @@ def test_check_prints_its_observations_and_exits_with_zero() -> None:
     assert done.output.count("warning: returns no diagnostics") == 1
 
 
-def test_check_exits_with_one_if_a_system_does_not_land() -> None:
-    done = garl("test_checked.py::test_other")
+def test_check_exits_with_one_if_a_system_does_not_land(tmp_path: Path) -> None:
+    (tmp_path / "test_gives_up.py").write_text(GIVES_UP)
+    done = garl("test_gives_up.py")
     assert done.exit_code == 1
     assert "fault: your system does not land in clear air, on lawn" in done.output
 
