@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 from pytest_garl.airframe import Camera
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import Database
+from pytest_garl.execution.result import Origin
 from pytest_garl.files.json_values import dataclass_from, parse_json
 
 T = TypeVar("T")
@@ -234,6 +235,15 @@ class Facts:
         """Return (signature, trajectory's hash) of each probe that a system violates."""
         return [(str(a), str(b)) for a, b in self._get(f"violated probes of {search}") or ()]
 
+    def note_origins(self, search: str, generation: int, origins: Sequence[Origin]) -> None:
+        """Note how the scenarios of a generation were made, by their slots."""
+        self._first(_origins(search, generation), [dataclasses.asdict(each) for each in origins])
+
+    def origins(self, search: str, generation: int) -> list[Origin]:
+        """Return how the scenarios of a generation were made; none if its method does not say."""
+        key = _origins(search, generation)
+        return [self._typed(Origin, key, each) for each in self._get(key) or ()]
+
     def note_user_failures(self, failures: Iterable[FailedFlightAssertion]) -> None:
         """Note the failed assertions about users' own properties."""
         self._set(_USER_FAILURES, [dataclasses.asdict(each) for each in failures])
@@ -315,6 +325,10 @@ class Facts:
 
     def _damaged(self, key: str, error: ValueError) -> LedgerError:
         return LedgerError(f"{self.path}: the fact {key!r} is damaged: {error}")
+
+
+def _origins(search: str, generation: int) -> str:
+    return f"origins of {search} {generation}"
 
 
 def _failure(key: str) -> str:

@@ -1,11 +1,11 @@
-"""Results of flights: the ledger stores them as JSON, all other rooms read their attributes."""
+"""Results of flights and origins of scenarios: the ledger stores them, other rooms read them."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
-from dataclasses import dataclass
-from typing import Any, Self
+from dataclasses import dataclass, field
+from typing import Any, Literal, Self
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import REMEDY
@@ -14,6 +14,24 @@ from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.flight.flight import Crash
 from pytest_garl.messages import visible
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Verdict
+
+How = Literal["control", "stratified", "bred"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """How the scenario of a slot was made: by chance, without parents, or from flights.
+
+    ``parents`` are the slots of the flights whose conditions and NPCs a child has, such as
+    ``court-g00-s03``.  ``expected`` is what the model of the landing system predicted: the
+    proximity of each property, from 1 on a violation; ``fails`` the probability of a violation,
+    None without a model.
+    """
+
+    how: How
+    parents: tuple[str, ...] = ()
+    expected: dict[str, float] = field(default_factory=dict)
+    fails: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

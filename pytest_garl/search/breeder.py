@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.scenarios.files import dump_scenario, parse_scenario
-from pytest_garl.search.method import FlownScenario, Method
+from pytest_garl.search.method import FlownScenario, Method, TellsOrigins
 
 
 class Breeder:
@@ -27,6 +27,8 @@ class Breeder:
         self._wanted = dict(wanted)
         self._last_generation = max(wanted)
         self._next_generation = 0
+        self._next_told = 0
+        """The first generation of which the method knows no results."""
 
     def advance(self) -> None:
         """Add every generation whose parents are flown to the ledger."""
@@ -36,28 +38,35 @@ class Breeder:
             slots = self._wanted.get(self._next_generation, ())
             if self._method.learns and self._next_generation < self._last_generation:
                 slots = range(len(scenarios))
+            if isinstance(self._method, TellsOrigins):
+                self._ledger.facts.note_origins(
+                    self._search, self._next_generation, self._method.origins
+                )
             texts = {slot: dump_scenario(scenarios[slot]) for slot in slots}
             self._ledger.add_slots(self._search, self._next_generation, texts)
             self._next_generation += 1
 
     @property
     def _parents(self) -> int:
-        """The generation that the next one needs the results of; negative if there is none."""
-        if not self._method.learns:
+        """The generation that the next one needs the results of; negative if there is none.
+
+        A method that overlaps is one generation behind, but for the second generation: without the
+        results of the first it would have nothing to breed from.
+        """
+        if not self._method.learns or self._next_generation == 0:
             return -1
-        return self._next_generation - (2 if self._method.overlaps else 1)
+        return max(0, self._next_generation - (2 if self._method.overlaps else 1))
 
     def _parents_are_flown(self) -> bool:
         return self._parents < 0 or self._ledger.queries.unflown(self._search, self._parents) == 0
 
     def _learn(self) -> None:
-        generation = self._parents
-        if generation < 0:
-            return
-        flown = [
-            FlownScenario(scenario=parse_scenario(text), result=result)
-            for text, result in self._ledger.generation(self._search, generation)
-            if result is not None
-        ]
-        objectives = self._method.tell(flown)
-        self._ledger.note_objectives(self._search, generation, objectives)
+        while self._next_told <= self._parents:
+            flown = [
+                FlownScenario(scenario=parse_scenario(text), result=result)
+                for text, result in self._ledger.generation(self._search, self._next_told)
+                if result is not None
+            ]
+            objectives = self._method.tell(flown)
+            self._ledger.note_objectives(self._search, self._next_told, objectives)
+            self._next_told += 1

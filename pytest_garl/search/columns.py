@@ -40,21 +40,30 @@ class OptionalGene:
 class Columns:
     """The columns of one genome.
 
-    ``outward`` are those whose values are harsher the farther they lie from nominal, ``owner`` is
-    the name of each column's gene, ``optional`` are the genes with a bit of activity.
+    ``outward`` are those whose values are harsher the farther they lie from nominal, ``chosen``
+    those that are flown as whole numbers, and ``named`` those of them that are choices.  ``owner``
+    is the name of each column's gene, ``slices`` are the columns of each nuclear gene, ``optional``
+    the genes with a bit of activity, ``bits`` the columns of these bits.
     """
 
     def __init__(self, genome: Genome) -> None:
         self.genome = genome
         self.lower, self.upper, self.nominal = genome.lower, genome.upper, genome.nominal
         self.outward: Mask = np.array([not item.even for item in genome.properties])
+        self.named: Mask = np.array([bool(each.choices) for each in genome.properties])
+        self.chosen: Mask = self.named | np.array([each.whole for each in genome.properties])
         self.owner = tuple(gene.name for gene in genome.genes for _ in gene.properties)
         firsts = [0, *genome.borders]
+        self.slices = tuple(
+            slice(first, first + len(gene.properties))
+            for gene, first in zip(genome.genes, firsts, strict=True)
+        )
         self.optional = tuple(
             _optional_gene(gene, first)
             for gene, first in zip(genome.genes, firsts, strict=True)
             if gene.is_optional
         )
+        self.bits = frozenset(gene.bit for gene in self.optional)
 
     @property
     def limit(self) -> int:
@@ -74,15 +83,6 @@ class Columns:
     def active(self, row: Matrix) -> tuple[OptionalGene, ...]:
         """Return the optional genes whose bit is on."""
         return tuple(gene for gene in self.optional if row[gene.bit] > ON_ABOVE)
-
-    def counting(self, row: Matrix) -> Mask:
-        """Return the columns whose values count: of genes that are not optional, or on."""
-        mask = np.ones(self.lower.size, dtype=bool)
-        for gene in self.optional:
-            mask[gene.bit] = False
-            if row[gene.bit] <= ON_ABOVE:
-                mask[gene.values] = False
-        return mask
 
     def with_active(self, row: Matrix, names: tuple[str, ...]) -> Matrix:
         """Return a copy in which exactly these optional genes are on."""
@@ -105,12 +105,6 @@ class Columns:
         span = (self.upper - self.lower)[gene.values]
         shares = np.abs(values - self.nominal[gene.values]) / span
         return float(np.sum(shares[self.outward[gene.values]]))
-
-    def distance_from_nominal(self, row: Matrix) -> float:
-        """Return how far the counting outward values lie from nominal, in shares of ranges."""
-        mask = self.counting(row) & self.outward
-        shares = (row - self.nominal)[mask] / (self.upper - self.lower)[mask]
-        return float(np.linalg.norm(shares))
 
 
 def _optional_gene(gene: NuclearGene, first: int) -> OptionalGene:

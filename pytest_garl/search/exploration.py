@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -74,6 +74,19 @@ class Exploration:
         genome = self._columns.genome
         drawn = [genome.random_active(rng, (gene.name,))[gene.values] for _ in range(draws)]
         return self.while_flying(gene, self.choose(gene, row, drawn))
+
+    def drawn(
+        self, row: Matrix, rng: np.random.Generator, count: int
+    ) -> Mapping[str, Sequence[Matrix]]:
+        """Return so many values of each optional gene, each as ``values`` draws them."""
+        columns, names = self._columns, [gene.name for gene in self._columns.optional]
+        found: dict[str, list[Matrix]] = {name: [] for name in names}
+        for _ in range(count if names else 0):
+            rows = [columns.genome.random_active(rng, names) for _ in range(self.draws)]
+            for gene in columns.optional:
+                drawn = [each[gene.values] for each in rows[: 1 if gene.is_npc else None]]
+                found[gene.name].append(self.while_flying(gene, self.choose(gene, row, drawn)))
+        return found
 
     def choose(self, gene: OptionalGene, row: Matrix, drawn: Sequence[Matrix]) -> Matrix:
         """Return the values that show most: a decoy near the UAV's way, others far from nominal."""

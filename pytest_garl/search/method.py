@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
-from pytest_garl.execution.result import FlightResult
+from pytest_garl.execution.result import FlightResult, Origin
 from pytest_garl.scenarios.genes import Genome
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -33,7 +33,8 @@ class FlownScenario:
 class Method(Protocol):
     """Breeds whole generations, so that the outcome does not depend on the workers.
 
-    ``ask`` and ``tell`` alternate, or ``tell`` is one generation behind if the method overlaps.
+    ``ask`` and ``tell`` alternate, or ``tell`` is one generation behind from the third generation
+    on if the method overlaps: the second one always waits for the results of the first.
     The scenarios that ``ask`` returns depend only on the plan and on the results given to ``tell``.
     ``tell`` is never called on a method that does not learn.
     """
@@ -47,6 +48,7 @@ class Method(Protocol):
         """Whether a generation may be asked for before the one before it is told.
 
         It depends on the results of those before that, and no worker waits for the last flight.
+        The second generation waits for the first all the same.
         """
 
     def ask(self) -> Sequence[Scenario]:
@@ -54,6 +56,15 @@ class Method(Protocol):
 
     def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Learn from the generation; return each flight's objectives, for the ledger."""
+
+
+@runtime_checkable
+class TellsOrigins(Protocol):
+    """A method that says how it made its scenarios, for the ledger."""
+
+    @property
+    def origins(self) -> Sequence[Origin]:
+        """How the scenarios of the latest generation were made, in order."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

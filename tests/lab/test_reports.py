@@ -12,8 +12,15 @@ from lab.table import Row
 def test_ablations_are_compared_seed_by_seed() -> None:
     def row(variant: str, seed: int, kinds: int) -> dict[str, str]:
         counts = {f"IV:{number}": 10 for number in range(kinds)}
-        facts = {"map": "court", "budget": "400", "early": "2", "first": "9", "landing": "sturdy"}
-        return {"variant": variant, "seed": str(seed), **facts, "kinds": json.dumps(counts)}
+        facts = {"map": "court", "budget": "400", "landing": "sturdy"}
+        early = {"early": "2", "middle": str(kinds - 1), "first": "9"}
+        return {
+            "variant": variant,
+            "seed": str(seed),
+            **facts,
+            **early,
+            "kinds": json.dumps(counts),
+        }
 
     seeds = (1, 2, 3)
     rows: list[Row] = [row("garl", seed, 4 + seed) for seed in seeds]

@@ -45,18 +45,25 @@ def test_a_decoy_has_a_place_unless_the_domain_takes_it_away(
         assert ((row >= columns.lower) & (row <= columns.upper)).all()
 
 
-def test_the_world_of_the_paper_has_no_strata_and_all_values_count() -> None:
-    columns = Columns(genome_for(MAP))
-    assert columns.strata == ()
-    assert columns.counting(columns.nominal).all()
+def test_the_world_of_the_paper_has_no_strata() -> None:
+    assert Columns(genome_for(MAP)).strata == ()
 
 
-def test_only_values_of_genes_that_are_on_count() -> None:
-    row = FIELD.with_active(FIELD.genome.random(np.random.default_rng(0)), ("wind",))
-    counting = {key for key, on in zip(FIELD.genome.keys, FIELD.counting(row), strict=True) if on}
-    wind = {"wind.mean_mps", "wind.towards_deg", "wind.turbulence"}
-    assert counting == wind | {"marker.x", "marker.y"}
-    assert [gene.name for gene in FIELD.active(row)] == ["wind"]
+def test_slices_hold_all_columns_of_their_gene_and_its_bit() -> None:
+    keys = FIELD.genome.keys
+    found = {keys[each.start]: keys[each] for each in FIELD.slices}
+    wind = ("active.wind", "wind.mean_mps", "wind.towards_deg", "wind.turbulence")
+    assert found["active.wind"] == wind
+    assert found["marker.x"] == ("marker.x", "marker.y")
+    assert {keys[bit] for bit in FIELD.bits} == {key for key in found if key.startswith("active.")}
+
+
+def test_choices_and_other_whole_numbers_are_told_from_numbers() -> None:
+    keys = FIELD.genome.keys
+    kind = keys.index("decoy-1.kind")
+    assert FIELD.named[kind]
+    assert FIELD.chosen[kind]
+    assert not FIELD.chosen[keys.index("wind.mean_mps")]
 
 
 def test_the_stratum_is_that_of_the_strongest_grade() -> None:
@@ -67,13 +74,3 @@ def test_the_stratum_is_that_of_the_strongest_grade() -> None:
     assert FIELD.stratum(row) == "careless"
     row[keys.index("dog-1.grade")] = 2.5
     assert FIELD.stratum(row) == "interfering"
-
-
-def test_the_distance_from_nominal_grows_with_harsher_values_alone() -> None:
-    keys = FIELD.genome.keys
-    row = FIELD.with_active(FIELD.genome.nominal, ("wind",))
-    assert FIELD.distance_from_nominal(row) == 0.0
-    row[keys.index("wind.towards_deg")] = 270.0
-    assert FIELD.distance_from_nominal(row) == 0.0
-    row[keys.index("wind.mean_mps")] = 3.0
-    assert FIELD.distance_from_nominal(row) == pytest.approx(0.5)

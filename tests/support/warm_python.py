@@ -40,6 +40,7 @@ IMPORTED_LATE = (
     "pytest_garl.cli",
     "pytest_garl.execution.on_demand",
     "pytest_garl.reports.causes",
+    "pytest_garl.search.evolution",
     "pytest_garl.search.methods.garl",
     "pytest_garl.search.methods.random",
     "pytest_garl.simulation.environment",

@@ -1,13 +1,18 @@
-"""garl: an archive of ways to fail, from which sparse scenarios are bred.
+"""garl: scenarios evolve in a model of the landing system, and the most promising ones are flown.
 
 The first generation is plain random scenarios of the domain: the control, to which the rest of the
-search is compared.  After it a bandit divides the flights between scenarios without parents, in
-strata without NPCs, with careless ones and with those that know of the UAV, and children of the
-archive's cells.  The first violation of a kind counts as a success and each further one less, so
-that a new kind is worth more than one more of the same.
+search is compared.  After it a generation has two parts:
 
-A generation is bred while the one before it is flown, and from the results of those before that:
-no worker waits for the last flight of a generation.
+- children, bred in a model that is fitted to the flights so far (``search/evolution.py``): whole
+  conditions and NPCs of two flown scenarios;
+- stratified scenarios, without parents (``search/exploration.py``), in strata without NPCs, with
+  careless ones and with those that know of the UAV.  A bandit divides them among the strata.  The
+  first violation of a kind counts as a success and each further one less.  They bring conditions
+  into the search that the model has not seen.
+
+The second generation waits for the control.  From then on a generation is bred while the one before
+it is flown, from the results of those before that: no worker waits for the last flight of a
+generation.
 
 A scenario that is flown like an earlier one is not flown again: its difference is a value that
 does not count.
@@ -15,32 +20,44 @@ does not count.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Sequence
+import math
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pytest_garl.execution.flight_id import Slot
+from pytest_garl.execution.result import Origin
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.archive import Archive
 from pytest_garl.search.bandit import Bandit
-from pytest_garl.search.breeding import WAYS, Breeding
 from pytest_garl.search.columns import Columns
 from pytest_garl.search.exploration import Exploration
 from pytest_garl.search.method import FlownScenario, MethodDeclaration, SearchPlan
 from pytest_garl.search.methods.random import random_scenarios
+from pytest_garl.search.model import PROPERTIES, MarginModel, proximities
 from pytest_garl.search.objectives import violation_proximity
 from pytest_garl.search.operators import Matrix
 from pytest_garl.search.seeding import seed_sequence
 
-EXPLORE = "explore "
-"""Begins the name of an arm without parents."""
+if TYPE_CHECKING:
+    from pytest_garl.search.evolution import Chosen
+
 ALL = "all"
 """The stratum of a genome without optional genes."""
+FINDING_WORTH = 0.5
+"""Success of the first flight in which something went wrong before its end: it is no violation
+until a flight without NPCs shows it."""
+FADING = 2
+"""A violation of a kind that n flights showed is worth 1 / n to this power to the model: the second
+of a kind says what else is near it, the tenth does not."""
+ROUNDING = 1e-9
+EXPECTED_DIGITS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,116 +67,193 @@ class GarlParameters:
     ``python -m lab.ablations`` measures what each part of the search is worth.
     """
 
-    explores_first: int = 100
-    """So many scenarios are random or without parents before any is bred: a search finds more in
-    conditions that did not act yet than near what it has found."""
-    explore_share: float = 0.75
-    """Least share of scenarios without parents after that, so that kinds are still found late."""
-    learns_arms: bool = True
-    """Whether cells and strata are chosen by their success; otherwise all alike."""
-    has_strata: bool = True
-    """Whether scenarios without parents are drawn in strata; otherwise as the domain draws them."""
-    archive: Callable[[Columns], Archive] = Archive
-    """What keeps the flights, and says which cells are bred from."""
+    bred_share: float = 0.5
+    """Share of the flights after the control that are children; all others are stratified."""
+    shuffled: bool = False
+    """Whether the model is fitted to results that are exchanged among the flights: a placebo, which
+    has the same machinery and knows nothing."""
     exploration: Callable[[Columns, Map], Exploration] = Exploration
     """What draws scenarios without parents."""
 
 
+EXPLORING = GarlParameters(bred_share=0.0)
+"""No children and no model."""
+
+
 class Garl:
-    """The archive of cells, and the breeding from it."""
+    """The search: its flights, and how its generations come about."""
 
     learns = True
     overlaps = True
 
     def __init__(self, plan: SearchPlan, parameters: GarlParameters | None = None) -> None:
         self._plan, self._parameters = plan, parameters or GarlParameters()
-        self._rng = np.random.default_rng(seed_sequence("garl", plan.map.name, plan.seed))
+        seeds = seed_sequence("garl", plan.map.name, plan.seed)
+        # Children draw from numbers of their own, so that without them the rest is drawn alike.
+        self._rng, self._breeding_rng = (
+            np.random.default_rng(each) for each in (seeds, seeds.spawn(1)[0])
+        )
         self._columns = Columns(plan.genome)
-        self._archive = self._parameters.archive(self._columns)
         self._exploration = self._parameters.exploration(self._columns, plan.map)
-        self._breeding = Breeding(self._columns, self._exploration)
-        self._arms = Bandit()
+        self._strata = Bandit()
         self._choices: dict[str, str] = {}
-        """The arm of each scenario, by its text."""
-        self._generation = 0
-        self._flights_s: list[float] = []
-        """How long each flight took, simulated."""
-        self._unlearned: deque[Sequence[FlownScenario]] = deque()
-        """Generations that were flown, and that the next one is not bred from yet."""
+        """The stratum of each scenario, by its text; empty for those that no stratum made."""
+        self._seen: Counter[str] = Counter()
+        """How many flights showed each kind of violation, or of finding."""
+        self._generation = -1
+        self._told: list[Sequence[FlownScenario]] = []
+        self._learned = 0
+        """So many generations were learned from."""
+        self._flown: list[FlownScenario] = []
+        """The flights of these generations, in order; ``_rows`` are their chromosomes."""
+        self._rows: list[Matrix] = []
+        self.origins: Sequence[Origin] = ()
 
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation; the first one is that of ``random``."""
         plan, self._generation = self._plan, self._generation + 1
-        if self._generation > 1:
-            if self._generation > 2:
-                self._learn(self._unlearned.popleft())
-            return [self._new() for _ in range(plan.population)]
-        control = random_scenarios(plan.map, plan.genome, plan.seed, 0, plan.population)
-        self._choices.update((dump_scenario(scenario), "") for scenario in control)
-        return control
+        if self._generation == 0:
+            control = random_scenarios(plan.map, plan.genome, plan.seed, 0, plan.population)
+            self._choices.update((dump_scenario(scenario), "") for scenario in control)
+            self.origins = [Origin(how="control") for _ in control]
+            return control
+        # Later results may be known already, which depends on who flies.
+        wanted = max(1, self._generation - 1)
+        for flown in self._told[self._learned : wanted]:
+            self._learn(flown)
+        self._learned = wanted
+        children = deque(self._children(sum(map(self._is_bred, range(plan.population)))))
+        made = [
+            children.popleft() if children and self._is_bred(place) else self._stratified()
+            for place in range(plan.population)
+        ]
+        self.origins = [origin for _, origin in made]
+        return [scenario for scenario, _ in made]
+
+    def _is_bred(self, place: int) -> bool:
+        """Whether a place in a generation is a child's: of the first n places a share is, always.
+
+        The last generation of a search may be flown in part.
+        """
+        before, after = (
+            math.ceil(self._parameters.bred_share * count - ROUNDING)
+            for count in (place, place + 1)
+        )
+        return after > before
 
     def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Keep the flights for the generation after the next; return proximities to a violation."""
-        self._unlearned.append(flown)
+        self._told.append(flown)
         return [(violation_proximity(item.result),) for item in flown]
 
     def _learn(self, flown: Sequence[FlownScenario]) -> None:
-        """Put each flight into its cells, and draw events into the time that flights take."""
-        self._flights_s += [item.result.elapsed_s for item in flown]
-        self._exploration.flight_s = float(np.median(self._flights_s))
+        """Learn which strata succeed, and draw events into the time that flights take."""
+        self._flown += flown
+        self._rows += [encode(item.scenario, self._plan.genome) for item in flown]
+        self._exploration.flight_s = float(np.median([f.result.elapsed_s for f in self._flown]))
         for item in flown:
-            row = encode(item.scenario, self._plan.genome)
-            success = self._archive.add(item, row)
-            self._arms.learn(self._choices[dump_scenario(item.scenario)], success)
+            self._strata.learn(self._choices[dump_scenario(item.scenario)], self._success(item))
 
-    def _new(self) -> Scenario:
-        """Return a scenario that is flown unlike all earlier ones."""
-        while True:
-            arm, way = self._choose()
-            if arm.startswith(EXPLORE):
-                row, seed = self._explored(arm.removeprefix(EXPLORE)), self._new_seed()
-            else:
-                row, seed = self._child(arm, way)
-            scenario = self._scenario(row, seed)
-            if dump_scenario(scenario) not in self._choices:
-                self._choices[dump_scenario(scenario)] = arm
-                return scenario
+    def _success(self, item: FlownScenario) -> float:
+        """Return the success of a flight, 0 to 1: the n-th of a kind is worth 1 / n."""
+        verdict = item.result.verdict
+        shown = [(finding.signature, FINDING_WORTH) for finding in verdict.findings]
+        if verdict.violation:
+            shown.append((item.result.signature, 1.0))
+        self._seen.update(signature for signature, _ in shown)
+        return max((worth / self._seen[signature] for signature, worth in shown), default=0.0)
 
-    def _choose(self) -> tuple[str, str]:
-        """Return an arm, and a way to breed for a cell."""
-        strata = self._columns.strata if self._parameters.has_strata else ()
-        explore = [f"{EXPLORE}{each}" for each in strata or (ALL,)]
-        cells = self._archive.names()
-        # A dense scenario has all conditions, so that there is nothing to explore first.
-        is_early = self._columns.strata and len(self._choices) < self._parameters.explores_first
-        if is_early or not cells or self._rng.random() < self._parameters.explore_share:
-            return self._pick(explore), ""
-        arm = self._pick([*explore, *cells])
-        return arm, "" if arm in explore else str(self._rng.choice(WAYS))
+    def _children(self, count: int) -> Iterator[tuple[Scenario, Origin]]:
+        """Yield so many children; fewer if the flights have too few conditions to cross."""
+        if count == 0:
+            return
+        # pymoo takes a third of a second to import.
+        from pytest_garl.search.evolution import Choice, Evolution
 
-    def _pick(self, names: Sequence[str]) -> str:
-        if self._parameters.learns_arms:
-            return self._arms.choose(names, self._rng)
-        return str(self._rng.choice(names))
+        rng, rows = self._breeding_rng, np.array(self._rows)
+        proximity = np.array([proximities(item.result) for item in self._flown])
+        violates = np.array([float(item.result.verdict.violation) for item in self._flown])
+        counts = np.array([max(1, self._seen[item.result.signature]) for item in self._flown])
+        rarity = violates / counts**FADING
+        if self._parameters.shuffled:
+            order = rng.permutation(len(rows))
+            proximity, violates, rarity = proximity[order], violates[order], rarity[order]
+        model = MarginModel(self._columns, rows, proximity, violates, rarity)
+        brood = Evolution(self._columns, self._exploration, model, rows, rng).candidates()
+        if not len(brood):
+            return
+        choice = Choice(brood, model, (proximity >= 1).astype(float))
+        of = np.array([self._stratum(row) for row in brood.rows])
+        while count:
+            stratum = self._strata.choose(self._arms, rng)
+            child = choice.best(of == stratum) or choice.best(np.ones(len(of), dtype=bool))
+            if child is None:
+                return
+            # Random moves are part of what the parent's NPC did.
+            scenario = self._scenario(child.row, self._flown[child.base].scenario.seed)
+            parents = self._parents(child, scenario)
+            if len(parents) >= 2 and self._is_new(scenario, self._stratum(child.row)):
+                yield scenario, self._origin(child, parents)
+                count -= 1
 
-    def _explored(self, stratum: str) -> Matrix:
-        if stratum == ALL:
-            return self._plan.genome.random(self._rng)
-        return self._exploration.new(stratum, self._rng)
+    @property
+    def _arms(self) -> Sequence[str]:
+        """The strata among which flights are divided."""
+        return self._columns.strata or (ALL,)
 
-    def _child(self, name: str, way: str) -> tuple[Matrix, int]:
-        """Return a child of one of a cell's flights.
+    def _stratum(self, row: Matrix) -> str:
+        return self._columns.stratum(row) if self._arms != (ALL,) else ALL
 
-        The child inherits the scenario's seed: random moves are part of the parent's success.
+    def _parents(self, child: Chosen, scenario: Scenario) -> list[int]:
+        """Return the flights of which a child has a condition or an NPC with all of its values.
+
+        Repairing a scenario may have moved a decoy or the marker.
         """
-        parent = self._archive.parent(name, self._rng)
-        donor = self._archive.parent(str(self._rng.choice(self._archive.names())), self._rng)
-        body = parent.flown.result.closest_body
-        row = self._breeding.child(way, parent.row, donor.row, body, self._rng)
-        return row, parent.flown.scenario.seed
+        row, slices = encode(scenario, self._plan.genome), self._columns.slices
+        return sorted(
+            {
+                flight
+                for gene, flight in child.sources.items()
+                if np.array_equal(row[slices[gene]], self._rows[flight][slices[gene]])
+            }
+        )
 
-    def _new_seed(self) -> int:
-        return int(self._rng.integers(2**32))
+    def _origin(self, child: Chosen, parents: Sequence[int]) -> Origin:
+        """Return what the ledger says of a child."""
+        slots = (divmod(parent, self._plan.population) for parent in parents)
+        return Origin(
+            how="bred",
+            parents=tuple(
+                Slot(generation=generation, index=index).id(self._plan.map.name)
+                for generation, index in slots
+            ),
+            expected={
+                name: round(value, EXPECTED_DIGITS)
+                for name, value in zip(PROPERTIES, child.proximity, strict=True)
+            },
+            fails=round(child.fails, EXPECTED_DIGITS),
+        )
+
+    def _stratified(self) -> tuple[Scenario, Origin]:
+        """Return a scenario without parents that is flown unlike all earlier ones."""
+        while True:
+            stratum = self._strata.choose(self._arms, self._rng)
+            row = (
+                self._plan.genome.random(self._rng)
+                if stratum == ALL
+                else self._exploration.new(stratum, self._rng)
+            )
+            scenario = self._scenario(row, int(self._rng.integers(2**32)))
+            if self._is_new(scenario, stratum):
+                return scenario, Origin(how="stratified")
+
+    def _is_new(self, scenario: Scenario, stratum: str) -> bool:
+        """Whether a scenario is new; from now on it is known."""
+        text = dump_scenario(scenario)
+        if text in self._choices:
+            return False
+        self._choices[text] = stratum
+        return True
 
     def _scenario(self, row: Matrix, seed: int) -> Scenario:
         plan = self._plan

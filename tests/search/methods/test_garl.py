@@ -1,24 +1,29 @@
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pytest
 
 from lab.stand_in import stand_in
-from pytest_garl.execution.result import FlightResult
+from pytest_garl.execution.flight_id import Slot
+from pytest_garl.execution.result import FlightResult, Origin
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.files import dump_scenario
-from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.genes import ON_ABOVE
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.columns import STRATA, Columns
 from pytest_garl.search.method import FlownScenario, SearchPlan
-from pytest_garl.search.methods.garl import Garl, GarlParameters
+from pytest_garl.search.methods.garl import EXPLORING, Garl, GarlParameters
 from pytest_garl.search.methods.random import RandomSearch
+from pytest_garl.search.objectives import SAFE_MARGINS
+from tests.support.results import flight_result
 
 MAP = load_map("court")
 GENOME = genome_of(domain_named("field"), MAP)
@@ -40,49 +45,115 @@ def told(scenarios: Sequence[Scenario], results: Sequence[FlightResult]) -> list
     return [FlownScenario(scenario=scenario, result=result) for scenario, result in pairs]
 
 
-def test_a_search_finds_kinds_more_evenly_than_chance() -> None:
-    def even(found: Counter[str]) -> float:
-        """Return the inverse of Simpson's concentration: the number of kinds as if all even."""
-        return found.total() ** 2 / sum(count**2 for count in found.values())
-
-    plans = [SearchPlan(map=MAP, genome=GENOME, seed=seed, population=20) for seed in range(3)]
-    by_garl = [even(signatures(Garl(plan), 12)) for plan in plans]
-    by_chance = [even(signatures(RandomSearch(plan), 12)) for plan in plans]
-    assert np.mean(by_garl) > 1.5 * np.mean(by_chance)
+def test_a_search_finds_more_kinds_than_chance() -> None:
+    assert len(signatures(Garl(PLAN), 10)) > len(signatures(RandomSearch(PLAN), 10)) + 2
 
 
 def test_the_first_generation_is_the_one_that_random_flies() -> None:
     assert Garl(PLAN).ask() == RandomSearch(PLAN).ask()
 
 
-def test_nothing_is_bred_before_a_hundred_scenarios_but_in_a_dense_world() -> None:
-    for genome, bred_from in ((GENOME, 5), (genome_for(MAP), 2)):
-        plan = SearchPlan(map=MAP, genome=genome, seed=0, population=20)
-        method, known = Garl(plan), set[int]()
-        inherited = []
-        for _ in range(12):
-            scenarios = method.ask()
-            inherited.append(any(each.seed in known for each in scenarios))
-            known |= {each.seed for each in scenarios}
-            method.tell(told(scenarios, [stand_in(each, MAP) for each in scenarios]))
-        # A child has its parent's seed.
-        assert inherited.index(True) == bred_from
+Made = list[tuple[Scenario, Origin]]
 
 
-def test_all_strata_are_flown() -> None:
-    method = Garl(PLAN, GarlParameters(explore_share=1.0))
+def flown(generations: int, plan: SearchPlan = PLAN, **parameters: Any) -> list[Made]:
+    """Return the generations of a search, each scenario with its origin."""
+    method, made = Garl(plan, GarlParameters(**parameters)), list[Made]()
+    for _ in range(generations):
+        scenarios = method.ask()
+        made.append([*zip(scenarios, method.origins, strict=True)])
+        method.tell(told(scenarios, [stand_in(each, MAP) for each in scenarios]))
+    return made
+
+
+@pytest.mark.parametrize("share", [0.5, 0.6, 1.0])
+@pytest.mark.parametrize("population", [8, 20])
+def test_at_least_its_share_of_all_flights_after_the_control_is_bred(
+    share: float, population: int
+) -> None:
+    plan = dataclasses.replace(PLAN, population=population)
+    made = flown(4, plan, bred_share=share)
+    hows = [origin.how for generation in made for _, origin in generation]
+    assert {*hows[:population]} == {"control"}
+    later = hows[population:]
+    # However many of its last flights a search does without.
+    for count in range(1, len(later) + 1):
+        bred = later[:count].count("bred")
+        generations = -(-count // population)
+        assert share * count - 1e-9 <= bred < share * count + generations
+
+
+def test_a_child_has_whole_conditions_and_npcs_of_each_of_its_parents() -> None:
+    made, columns = flown(5), Columns(GENOME)
+    rows = {
+        Slot(generation=g, index=i).id("court"): encode(scenario, GENOME)
+        for g, generation in enumerate(made)
+        for i, (scenario, _) in enumerate(generation)
+    }
+    optional = [slice(gene.bit, gene.values.stop) for gene in columns.optional]
+    for number, generation in enumerate(made):
+        for scenario, origin in generation:
+            assert bool(origin.parents) == (origin.how == "bred")
+            child = encode(scenario, GENOME)
+            for parent in origin.parents:
+                # Of the generation before nothing is known yet, but for the control.
+                assert int(parent.split("-g")[1][:2]) <= max(0, number - 2)
+                shared = [
+                    own
+                    for own in optional
+                    if child[own.start] > ON_ABOVE and np.array_equal(child[own], rows[parent][own])
+                ]
+                assert shared
+            assert len(origin.parents) != 1
+
+
+def test_a_child_tells_what_the_model_expects_of_it() -> None:
+    children = [each for made in flown(4) for _, each in made if each.how == "bred"]
+    assert len(children) == 30
+    for child in children:
+        assert {*child.expected} == {*SAFE_MARGINS}
+        assert child.fails is not None
+        assert 0 <= child.fails <= 1
+
+
+def test_a_shuffled_model_has_the_same_machinery_and_knows_nothing() -> None:
+    def told_from_others(**parameters: Any) -> float:
+        """Return by how much more a model expects of the children that violate something."""
+        method, expected = Garl(PLAN, GarlParameters(**parameters)), dict[bool, list[float]]()
+        for _ in range(6):
+            scenarios, results = method.ask(), []
+            for scenario, origin in zip(scenarios, method.origins, strict=True):
+                violates = scenario["wind.mean_mps"] > 2
+                results.append(flight_result("off" if violates else ""))
+                if origin.fails is not None:
+                    expected.setdefault(violates, []).append(origin.fails)
+            method.tell(told(scenarios, results))
+        return float(np.mean(expected[True]) - np.mean(expected[False]))
+
+    assert told_from_others() > 0.3
+    assert abs(told_from_others(shuffled=True)) < 0.1
+
+
+def test_a_search_that_only_explores_breeds_nothing_and_flies_all_strata() -> None:
+    method = Garl(PLAN, EXPLORING)
     columns, rows = Columns(GENOME), []
     for generation in range(4):
         scenarios = method.ask()
+        assert {each.how for each in method.origins} == {"stratified" if generation else "control"}
         method.tell(told(scenarios, [stand_in(each, MAP) for each in scenarios]))
         # The first generation is random.
         rows += [encode(each, GENOME) for each in scenarios if generation > 0]
     assert {columns.stratum(row) for row in rows} == {*STRATA}
 
 
+def test_a_generation_that_nothing_can_be_crossed_for_is_stratified() -> None:
+    made = flown(2, dataclasses.replace(PLAN, population=1))
+    assert [[origin.how for _, origin in each] for each in made] == [["control"], ["stratified"]]
+
+
 def test_a_scenario_that_is_flown_like_an_earlier_one_is_not_flown_again() -> None:
     method, texts = Garl(PLAN), Counter[str]()
-    for _ in range(8):
+    for _ in range(5):
         scenarios = method.ask()
         texts.update(dump_scenario(each) for each in scenarios)
         method.tell(told(scenarios, [stand_in(each, MAP) for each in scenarios]))
