@@ -79,6 +79,8 @@ def _search(run: RunRecord, search: SearchRecord) -> dict[str, Any]:
         "causes": search.causes,
         "effective_kinds": round(search.effective_kinds, 4),
         "control": _control(search, search.control) if search.control else None,
+        "origins": [dataclasses.asdict(each) for each in search.origins],
+        "model": None if search.model is None else dataclasses.asdict(search.model),
         "signatures": [
             {
                 **_kind(run, search, kind),

@@ -16,6 +16,7 @@ from pytest_garl.execution.facts import Facts, SearchKey, search_names
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
+from pytest_garl.execution.result import Origin
 from pytest_garl.execution.severity import Severity
 from pytest_garl.execution.stored_ledger import checked_ledger
 from pytest_garl.reports.control_arm import control_arm, is_control
@@ -28,6 +29,7 @@ from pytest_garl.reports.run_record import (
     SearchRecord,
     place_of,
 )
+from pytest_garl.reports.search_origins import Made, model_record, origin_records
 from pytest_garl.scenarios.files import dump_scenario
 
 _NONE: Mapping[str, tuple[Severity, str]] = MappingProxyType({})
@@ -129,6 +131,7 @@ def _search(
     method = facts.method
     control = control_arm(method, flights)
     random = {f.id.slot_id for f in flights if is_control(method, f.id.slot.generation)}
+    made = _with_origins(facts, flights)
     compares = control is not None and control.later.flights > 0
     return SearchRecord(
         key=key,
@@ -141,8 +144,24 @@ def _search(
         limits=tuple(dict.fromkeys(each.limits for each in jobs.values())),
         npcs=tuple(dict.fromkeys(each.npcs.name for each in jobs.values())),
         control=control,
+        origins=origin_records(made),
+        model=model_record(made),
         camera=facts.camera(key.system),
     )
+
+
+def _with_origins(facts: Facts, flights: Sequence[LedgerFlight]) -> Made:
+    """Return the flights of which the method tells how their scenarios were made."""
+    origins: dict[tuple[str, int], list[Origin]] = {}
+    made = []
+    for flight in flights:
+        search, slot = flight.id.search, flight.id.slot
+        key = search, slot.generation
+        if key not in origins:
+            origins[key] = facts.origins(*key)
+        if slot.index < len(origins[key]):
+            made.append((flight, origins[key][slot.index]))
+    return made
 
 
 def _saved_cases(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from pytest_garl.execution.result import How
 from pytest_garl.files.run_files import RUN_FOLDER
 from pytest_garl.messages import command
 from pytest_garl.reports.control_arm import LEAST_FLIGHTS, ControlArm
@@ -31,6 +32,8 @@ LEGEND = {
 }
 """Meanings of the types of violations and findings: a signature's part before the first colon."""
 
+_MADE: Mapping[How, str] = {"control": "random", "stratified": "stratified", "bred": "bred"}
+
 
 def run_text(run: RunRecord) -> str:
     """Return a run in short, for ``garl report``."""
@@ -44,7 +47,7 @@ def run_text(run: RunRecord) -> str:
             f"gave up: {counts_text(search.gave_up)}"
             f"{f'; ran out of time: {counts_text(late)}' if any(late.values()) else ''}"
         )
-        lines += [f"  {text}" for text in [control_text(search)] if text]
+        lines += [f"  {text}" for text in (control_text(search), origins_text(search)) if text]
         lines += [line for kind in search.kinds for line in _kind_lines(run, search, kind)]
     return "\n".join([*lines, ""]) if lines else "no flights yet\n"
 
@@ -110,7 +113,8 @@ def kinds_lines(search: SearchRecord) -> list[str]:
     diverse = (
         f"{number} kinds of violation{causes}, as diverse as {effective:.1f} equally frequent ones"
     )
-    return [text for text in (diverse if number > 1 else "", control_text(search)) if text]
+    texts = diverse if number > 1 else "", control_text(search), origins_text(search)
+    return [text for text in texts if text]
 
 
 def counted_causes(kinds: Sequence[KindRecord]) -> str:
@@ -133,6 +137,27 @@ def control_text(search: SearchRecord) -> str:
     own = any(kind.type == "own" for kind in search.kinds)
     remark = " (assertions of your own left out)" if own else ""
     return f"{_compared(search.control)}{remark}"
+
+
+def origins_text(search: SearchRecord) -> str:
+    """Return what chance, draws and evolution found; empty if the method does not tell.
+
+    Such as ``new kinds: 2 in 20 random flights, 6 in 40 stratified ones, 3 in 40 bred ones (17 of
+    these violate; the model expected 15.2)``.
+    """
+    if not search.origins:
+        return ""
+    found = [
+        f"{each.first} in {each.flights} {_MADE[each.how]} {'ones' if place else 'flights'}"
+        for place, each in enumerate(search.origins)
+    ]
+    model = search.model
+    expected = (
+        f" ({model.violating} of these violate; the model expected {model.expected:.1f})"
+        if model
+        else ""
+    )
+    return f"new kinds: {', '.join(found)}{expected}"
 
 
 def in_control_text(in_control: int | None, random_flights: int) -> str:

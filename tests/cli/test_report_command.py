@@ -189,7 +189,9 @@ def test_a_report_compares_random_flights_with_as_many_later_ones(tmp_path: Path
     kinds = control["random"]["kinds"]
     assert found["random"] == {"mean": kinds, "range_95": [kinds, kinds]}
     low, high = found["later"]["range_95"]
-    assert low <= found["later"]["mean"] <= high <= control["later"]["kinds"]
+    assert low <= high <= control["later"]["kinds"]
+    # Nearly all picks show as many kinds, and a few one less.
+    assert low - 0.1 <= found["later"]["mean"] <= high + 0.1
     assert all(kind["in_control"] <= kind["count"] for kind in one["signatures"])
     words = garl(tmp_path, "report")
     assert f"  {control['text']}\n" in words

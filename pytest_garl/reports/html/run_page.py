@@ -22,6 +22,7 @@ from pytest_garl.reports.run_text import (
     in_control_text,
     kinds_lines,
     limits_text,
+    origins_text,
     percent,
 )
 
@@ -154,6 +155,16 @@ def figures(search: SearchRecord) -> list[Fact]:
             ),
             ("time to the touchdown", f"median {time_s.median:.1f} s, worst {time_s.worst:.1f} s"),
         ]
+    if search.origins:
+        found.append(("how scenarios were made", origins_text(search)))
+    if search.model is not None:
+        found.append(
+            (
+                "error of the model's margins",
+                f"{search.model.error:.2f} of a safe margin, {search.model.error_of_mean:.2f} by "
+                "the mean of earlier flights",
+            )
+        )
     return [figure for figure in found if figure[1]]
 
 

@@ -1,0 +1,101 @@
+"""What the scenarios of each way found, and how well the model predicted."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import pytest
+
+from pytest_garl.execution.facts import SearchKey
+from pytest_garl.execution.flight_id import FlightId, Slot
+from pytest_garl.execution.ledger_queries import LedgerFlight
+from pytest_garl.execution.result import Origin
+from pytest_garl.reports.run_record import SearchRecord
+from pytest_garl.reports.run_text import origins_text
+from pytest_garl.reports.search_origins import model_record, origin_records
+from pytest_garl.search.model import PROPERTIES
+from pytest_garl.search.objectives import SAFE_MARGINS
+from pytest_garl.verdicts.verdict import Margin
+from tests.support.results import flight_result
+
+DOG, BIRD = "IV:dog:descent:seen", "IV:bird:descent:seen"
+CONTROL, DRAWN = Origin(how="control"), Origin(how="stratified")
+
+
+def child(near: float, fails: float) -> Origin:
+    """Return a child of which a model expects the same proximity for each property."""
+    names: Sequence[str] = PROPERTIES
+    expected = dict.fromkeys(names, near)
+    return Origin(how="bred", parents=("lawn-g00-s00",), expected=expected, fails=fails)
+
+
+def flight(generation: int, index: int, signature: str = "", near: float = 0.0) -> LedgerFlight:
+    margins = tuple(
+        Margin(property=name, value=safe * (1 - near), unit="1")
+        for name, safe in SAFE_MARGINS.items()
+    )
+    return LedgerFlight(
+        id=FlightId(search="s", map="lawn", slot=Slot(generation=generation, index=index)),
+        system="my_landing:Mine",
+        scenario="",
+        result=flight_result(signature, margins=margins),
+        sha256="",
+    )
+
+
+MADE: Sequence[tuple[LedgerFlight, Origin]] = (
+    (flight(0, 0, DOG), CONTROL),
+    (flight(0, 1), CONTROL),
+    (flight(1, 0, DOG), child(0.2, 0.5)),
+    (flight(1, 1, BIRD), DRAWN),
+    (flight(2, 0, BIRD), child(0.2, 0.25)),
+    (flight(2, 1, "off"), child(0.2, 0.5)),
+)
+
+
+def test_each_way_is_told_with_the_kinds_that_it_found_first() -> None:
+    found = [(e.how, e.flights, e.violating, e.kinds, e.first) for e in origin_records(MADE)]
+    assert found == [("control", 2, 1, 1, 1), ("stratified", 1, 1, 1, 1), ("bred", 3, 3, 3, 1)]
+
+
+def test_a_method_that_does_not_tell_has_no_records() -> None:
+    assert origin_records(()) == ()
+    assert model_record(()) is None
+    assert model_record(MADE[:2]) is None
+
+
+def test_expected_violations_stand_beside_those_that_came() -> None:
+    record = model_record(MADE)
+    assert record is not None
+    assert (record.flights, record.expected, record.violating) == (3, 1.25, 3)
+
+
+def test_errors_are_those_of_children_and_of_the_mean_of_what_the_model_knew() -> None:
+    made = (
+        (flight(0, 0, near=0.0), CONTROL),
+        (flight(0, 1, near=0.2), CONTROL),
+        # Nobody knows this flight when the next generation is bred.
+        (flight(1, 0, near=0.9), DRAWN),
+        (flight(2, 0, near=0.5), child(0.45, 0.0)),
+        (flight(3, 0, near=0.4), child(0.45, 0.0)),
+    )
+    record = model_record(made)
+    assert record is not None
+    assert record.error == pytest.approx(0.05)
+    later_mean = (0.0 + 0.2 + 0.9) / 3
+    assert record.error_of_mean == pytest.approx((0.4 + abs(0.4 - later_mean)) / 2)
+
+
+def test_the_summary_tells_it_in_one_line() -> None:
+    key = SearchKey(system="my_landing:Mine", map="lawn")
+    flights = tuple(each for each, _ in MADE)
+    search = SearchRecord(key=key, name=key.place, flights=flights, kinds=(), violating=0)
+    assert origins_text(search) == ""
+    told = dataclasses.replace(search, origins=origin_records(MADE), model=model_record(MADE))
+    assert origins_text(told) == (
+        "new kinds: 1 in 2 random flights, 1 in 1 stratified ones, 1 in 3 bred ones "
+        "(3 of these violate; the model expected 1.2)"
+    )
+    drawn = dataclasses.replace(told, origins=told.origins[:2], model=None)
+    assert origins_text(drawn) == "new kinds: 1 in 2 random flights, 1 in 1 stratified ones"
