@@ -20,13 +20,12 @@ def test_make_runs_the_experiment_tested_here() -> None:
 @pytest.mark.sim
 @pytest.mark.long
 def test_a_toy_experiment_is_flown_measured_and_reported(tmp_path: Path) -> None:
-    def garl(*words: str) -> None:
-        code = "from pytest_garl.cli import main; main()"
-        command = [sys.executable, "-c", code, "experiment", PLAN, f"--out={tmp_path}", *words]
+    def experiment(*words: str) -> None:
+        command = [sys.executable, "-m", "lab.experiment", PLAN, f"--out={tmp_path}", *words]
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
 
-    garl(f"--folder={tmp_path / 'runs'}")
+    experiment(f"--folder={tmp_path / 'runs'}")
     rows = read_rows(tmp_path / "smoke.csv")
     assert [(row.method, row.policy, row.seed) for row in rows] == [
         ("garl", "dqn", 0),
@@ -44,7 +43,7 @@ def test_a_toy_experiment_is_flown_measured_and_reported(tmp_path: Path) -> None
         assert row.counts is not None
         assert sum(row.counts) == row.violations
         assert row.landings + row.paper_violations <= row.budget
-    garl("--report")
+    experiment("--report")
     text = (tmp_path / "smoke.md").read_text()
     assert "Toy: 4 of 4 searches of 3 flights" in text
     assert (tmp_path / "pictures" / "smoke-toy.png").is_file()
