@@ -3,31 +3,33 @@
 A search of 400 flights is too short to evolve in: NSGA-II needs thousands of evaluations, and a
 flight costs a second.  So a generation of flights is bred in these steps:
 
-1. *Fit.*  ``model.py`` is fitted to the proximities of all flights so far: how near each came to
-   violating each property.  It costs some 0.1 s for 400 flights.
+1. *Fit.*  ``model.py`` is fitted to all flights so far: how near each came to violating each
+   property, and how rare the kind of its violation is.  It costs some 0.1 s for 400 flights.
 2. *Start.*  The flown scenarios are the first population; nothing is drawn.
 3. *Evolve.*  Two parents are chosen by tournament of rank and crowding, as in NSGA-II (Deb et al.
    2002; pymoo's survival).  A child has whole conditions and NPCs of two *flown* scenarios: nuclear
-   genes, which the paper's crossover never divides.  Half of the children get a condition that
-   neither parent has, with values drawn as ``exploration.py`` draws them: the mutation.  Each of
-   ``GENERATIONS`` generations has ``POPULATION`` children, and some 500 candidates cost 0.2 s.
-   Their objectives are the proximity of each property that the model thinks possible, the
-   probability of a violation, and how unlike what was flown a candidate is.
-4. *Choose.*  Of all candidates those are flown, one after another, of which the model expects most
-   to fail in a way that no flight showed yet, or knows least.  A property that was violated by
-   flights like the candidate counts less, and so does one that a candidate chosen before is
-   expected to violate: a generation does not hold one scenario twenty times.
+   genes, which the paper's crossover never divides.  The mutation adds a gene that neither parent
+   has, an NPC or a condition, with values drawn as ``exploration.py`` draws them.  Each of
+   ``GENERATIONS`` generations has ``POPULATION`` children, and these 480 candidates cost 0.1 s.
+   Their objectives are the proximity of each property that the model thinks possible, the rarity
+   of the kind that it expects, and how unlike what was flown a candidate is.
+4. *Choose.*  ``garl`` asks for one candidate after the other, each in a stratum.  The best one
+   should show a kind of violation that few flights showed, violate a property that nothing like it
+   violated, or is one that the model knows little of.  Whatever is like it is worth less from then
+   on, so that a generation does not hold one scenario twenty times.
 
-Why a model and not the flights: bred from flights alone, children repeat what is known (they found
-no kind that scenarios without parents did not find).  Why whole genes of flown scenarios and not of
-any: their effect was seen, and a child says which of its parents' conditions it joins.  Why NSGA-II
-and not the best by one figure: each property has its own best candidates, so that a property that
-is hard to violate does not go under.
+Why a model and not the flights: children of flights that violated something, bred without one,
+repeated what was known.  Why whole genes of flown scenarios: their effect was seen, and a child
+says which of its parents' conditions it joins.  Why NSGA-II and not the best by one figure: each
+property has its own best candidates, so that one that is hard to violate does not go under.  Why
+rarity and not the probability of a violation: with that, half of the children were violations of
+the two most frequent kinds.  Why strata: NPCs differ in values that the model can tell least of, so
+that without strata hardly any was chosen.
 
-For example: in flight ``g00-s03`` a gust moved the UAV by half a metre, in ``g01-s07`` a person
-stood so near that the UAV waited.  Neither violated anything.  The model has seen that both lower
-the margins of distance and time, and that the two have no flight in common.  The child with this
-gust and this person is flown; its parents are ``g00-s03`` and ``g01-s07``.
+For example: in flight ``g00-s03`` a strong wind lowered the margin of distance to half, in
+``g01-s07`` so did a late clock of the camera.  Neither violated anything, and no flight had both.
+The model adds the two effects up and is unsure of what they do together.  The child with this wind,
+this clock and a dog that was drawn anew is flown; its parents are ``g00-s03`` and ``g01-s07``.
 
 A row is a chromosome, and beside it stands where each of its genes is from: the flown scenario, or
 nobody.  So each candidate can say who its parents are, however many generations of the model lie

@@ -193,8 +193,13 @@ def test_a_report_compares_random_flights_with_as_many_later_ones(tmp_path: Path
     # Nearly all picks show as many kinds, and a few one less.
     assert low - 0.1 <= found["later"]["mean"] <= high + 0.1
     assert all(kind["in_control"] <= kind["count"] for kind in one["signatures"])
+    made = {each["how"]: each["flights"] for each in one["origins"]}
+    assert made == {"control": 20, "stratified": 12, "bred": 12}
+    assert sum(each["first"] for each in one["origins"]) == len(one["signatures"])
+    assert one["model"]["flights"] == 12
     words = garl(tmp_path, "report")
     assert f"  {control['text']}\n" in words
+    assert "  new kinds: " in words
     assert "random flights\n        pytest test_it.py --garl-repeat=" in words
 
 
