@@ -186,7 +186,9 @@ def test_without_an_encoder_nothing_is_flown(
     assert not (pytester.path / ".garl").exists()
 
 
-@IN_PARALLEL
+@pytest.mark.parametrize(
+    "parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)], ids=["alone", "n2"]
+)
 def test_an_interrupted_run_draws_nothing(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:

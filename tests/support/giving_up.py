@@ -19,7 +19,7 @@ class HoverThenAbort:
         x, y, z = mission.home_m
         self.goal = PositionSetpoint(position_m=(x, y, z + 8.0))
     def step(self, observation):
-        return Abort() if observation.time_s >= 100.0 else self.goal
+        return Abort() if observation.time_s >= 30.0 else self.goal
 
 class TouchFarThenAbort:
     def reset(self, mission):
