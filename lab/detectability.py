@@ -25,8 +25,8 @@ from lab.detectability_conditions import CONDITIONS
 from lab.detectability_fit import auc, brier, deciles, fit
 from lab.detectability_frames import KINDS, MAPS, Detectors, Kind, ReadFrame, read_frames
 from pytest_garl import cpu_dispatch
+from pytest_garl.flight.detectability import COEFFICIENTS, Network, features
 from pytest_garl.flight.flight import MarkerView
-from pytest_garl.verdicts.detectability import COEFFICIENTS, Network, features
 
 Array = NDArray[np.float64]
 FIELDS = tuple(field.name for field in dataclasses.fields(MarkerView))

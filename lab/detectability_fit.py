@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import rankdata
 
-from pytest_garl.verdicts.detectability import Network
+from pytest_garl.flight.detectability import Network
 
 Array = NDArray[np.float64]
 HIDDEN_UNITS = 8

@@ -30,6 +30,7 @@ from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import View, eye_under
 from pytest_garl.simulation.camera.solids import BodyPose
+from pytest_garl.simulation.landing_moments import LandingMoments
 
 SEED = 260_000
 MAPS = ("court", "lawn")
@@ -219,7 +220,7 @@ def drawn_frames(number: int, kind: Kind) -> Iterator[tuple[DrawnFrame, Scenario
     rng = np.random.default_rng([SEED, KINDS.index(kind), number])
     map = load_map(MAPS[number % len(MAPS)])
     scenario = random_scenario(rng, map)
-    renderer = renderer_of(Placed(scenario, map), CAMERA)
+    renderer = renderer_of(Placed(scenario, map), CAMERA, LandingMoments())
     for _ in range(FRAMES):
         position, attitude = random_pose(rng, renderer.marker_m, kind)
         objects = random_objects(rng, map, renderer.marker_m)

@@ -46,8 +46,9 @@ from pytest_garl.npcs.training.director_training import (
 )
 from pytest_garl.npcs.training.presets import PRESETS
 from pytest_garl.npcs.training.selection import REPORT_SEEDS_FROM
+from pytest_garl.scenarios.groups import DESCENT
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.story import PHASES, STORY
+from pytest_garl.scenarios.story import STORY
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S
 
 PRESET = PRESETS["director"]
@@ -104,10 +105,10 @@ class Decider:
 
 
 def as_gene(table: MomentTable) -> int | None:
-    """Return the begin that the domain `field` draws: a phase and a delay after it."""
+    """Return a begin as a search draws it: a moment of the descent and a delay after it."""
     rng = np.random.default_rng((SEED, table.seed))
-    phase = int(rng.integers(len(PHASES)))
-    begins_s = table.phases_s[phase] + float(rng.uniform(*STORY["delay_s"].draws))
+    phase = int(rng.integers(len(DESCENT)))
+    begins_s = table.descent_s[phase] + float(rng.uniform(*STORY["delay_s"].draws))
     number = np.ceil(begins_s / DECISION_STEP_S - 1e-9)
     return int(number) if number < len(table.features) else None
 

@@ -19,7 +19,7 @@ import numpy as np
 from lab.stand_in_way import ORDINARY, TAKE_OFF_S, Event, LandingModel, Way, meet_bodies
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.severity import NO_SEVERITY
-from pytest_garl.scenarios.groups import DECOY_KINDS
+from pytest_garl.scenarios.groups import DECOY_KINDS, QUANTITIES
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
@@ -104,9 +104,15 @@ def _losses(scenario: Scenario) -> list[tuple[str, float, float]]:
     return [each for each in LOSSES if each[0] in known]
 
 
+def _begins_s(scenario: Scenario, name: str, way: Way) -> float:
+    """Return when an event begins."""
+    moment = int(QUANTITIES[f"{name}.after"].flown(scenario[f"{name}.after"]))
+    return way.moments_s[moment] + scenario[f"{name}.from_s"]
+
+
 def _covers(scenario: Scenario, name: str, way: Way) -> float:
     """Return for how long an event lasts while the UAV comes down."""
-    begins = scenario[f"{name}.from_s"]
+    begins = _begins_s(scenario, name, way)
     ends = begins + scenario[f"{name}.lasts_s"]
     return max(0.0, min(ends, way.lands_s) - max(begins, way.descends_s))
 
@@ -119,8 +125,7 @@ def _off_m(scenario: Scenario, way: Way, rng: np.random.Generator) -> float:
     off = 0.05 + 0.02 * turned + 0.02 * gust + 0.3 * late_s * wind
     off += 0.04 * scenario["navigation.tilt_deg"] * (1 + 4 * late_s)
     off += 0.0006 * abs(scenario["timing.stamp_error_ms"]) * wind
-    jumps_s = scenario["jump.from_s"]
-    if way.phases_s[2] <= jumps_s <= way.lands_s:
+    if way.moments_s[2] <= _begins_s(scenario, "jump", way) <= way.lands_s:
         off += 0.5 * scenario["jump.distance_m"]
     off += 0.03 * _covers(scenario, "burst", way) * scenario["burst.latency_ms"] / 1000 * wind
     frozen = scenario["outage.frozen"] >= 0.5

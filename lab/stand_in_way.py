@@ -16,6 +16,8 @@ TAKE_OFF_S = 5.0
 DESCENT_MPS = 1.2
 STEP_S = 0.1
 HULL_M = 0.5
+LOST_BELOW_M = 0.5
+"""Below it the marker does not fit into the frame."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,14 +69,21 @@ class Way:
         return self.descends_s + HIGH_M / DESCENT_MPS
 
     @property
-    def phases_s(self) -> tuple[float, float, float, float]:
-        """When the phases of stories begin."""
+    def moments_s(self) -> tuple[float, ...]:
+        """When the moments of the landing come; the marker is readable as soon as it is near."""
         return (
             0.0,
             self.descends_s + (HIGH_M - 8.0) / DESCENT_MPS,
             self.descends_s + (HIGH_M - 3.0) / DESCENT_MPS,
             self.lands_s,
+            self.over_told_s,
+            self.lands_s - LOST_BELOW_M / DESCENT_MPS,
         )
+
+    def met_s(self, npc: PlacedNpc) -> float:
+        """Return when an NPC can just meet the UAV where that comes down."""
+        way_s = math.dist(npc.start_m, self.marker_m) / max(0.1, npc.speed_mps)
+        return max(self.descends_s, self.lands_s - npc.type.height_m / DESCENT_MPS - way_s)
 
     def at(self, time_s: float) -> tuple[float, float, float]:
         """Return where the UAV is."""
@@ -124,7 +133,7 @@ def _least_gap(npc: PlacedNpc, way: Way, story: Story) -> tuple[float, float, bo
     """Return the least gap between the UAV and a body, when it was, and whether it was in view."""
     kind, speed, (x, y) = npc.type, npc.speed_mps, npc.start_m
     cx, cy = (a + b for a, b in zip(way.marker_m, story.crossing_m, strict=True))
-    begins = story.begins_s(way.phases_s)
+    begins = story.begins_s((*way.moments_s, way.met_s(npc)))
     middle = npc.height_m
     stays_until, met_s, crossed = math.inf, math.inf, False
     best = (10.0, 0.0, False)

@@ -35,6 +35,7 @@ from pytest_garl.simulation.camera.particles import Particles
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.solids import PaintedSolid, Solids
 from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.landing_moments import LandingMoments
 
 MAPS = ("court", "lawn")
 HEIGHTS_M = (10.0, 10.0, 10.0, 8.0, 6.0, 4.0, 2.0, 1.0)
@@ -66,7 +67,7 @@ def frame_ms(scenario: Scenario) -> list[float]:
     """Return the processor time in milliseconds of each frame of a landing's views."""
     map, rng = load_map(scenario.map), np.random.default_rng(scenario.seed)
     placed = Placed(scenario, map)
-    made = renderer_of(placed, Camera())
+    made = renderer_of(placed, Camera(), LandingMoments())
     x, y = made.marker_m
     times = []
     for number, height in enumerate(HEIGHTS_M):

@@ -14,7 +14,6 @@ import numpy as np
 
 from pytest_garl.cases.clearance import Clearance, ObjectPose
 from pytest_garl.flight.flight import Flight, Track
-from pytest_garl.flight.landing_phases import LandingPhases
 from pytest_garl.flight.thresholds import GRAVITY_MPS2, feet_height_m
 from pytest_garl.landing_system import Airframe, VelocitySetpoint
 from pytest_garl.scenarios.bodies import rotate
@@ -22,9 +21,9 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.environment import environment_at
+from pytest_garl.simulation.landing_moments import LandingMoments
 from pytest_garl.simulation.npc_policy import (
     DECISION_STEP_S,
-    NpcState,
     PolicySpec,
     Situation,
 )
@@ -78,7 +77,7 @@ class EscapeModel:
         self._index = track.index_at(from_s + 1e-6)
         self._model = vehicle_model(chase.airframe)
         self._wind = mean_wind(chase.scenario, chase.map.ground.texture)
-        self._phases, self._known_samples = LandingPhases(), 0
+        self._moments, self._known_samples = LandingMoments(chase.flight.moments), 0
         self._npcs = self._warm_npcs()
 
     def position_m(self, name: str = "") -> Vector:
@@ -88,7 +87,7 @@ class EscapeModel:
     def escapes(self, legs: tuple[Leg, ...], until_s: float) -> bool:
         """Return whether the UAV keeps clear of everything until a time if it flies the legs."""
         npcs = [_copied(npc) for npc in self._npcs]
-        phases = copy.deepcopy(self._phases)
+        moments = copy.deepcopy(self._moments)
         uav = _Uav(self._model, self._wind, self._first_motion())
         clearance = Clearance(self._chase.world, MODEL_KEPT_M)
         first, last = round(self.from_s * PHYSICS_RATE_HZ), round(until_s * PHYSICS_RATE_HZ)
@@ -96,7 +95,7 @@ class EscapeModel:
         for tick in range(first, last + 1):
             now = tick / PHYSICS_RATE_HZ
             if tick % TICKS_PER_NPC_STEP == 0:
-                self._move(npcs, tick, uav.motion, scenario, phases)
+                self._move(npcs, tick, uav.motion, scenario, moments)
             if tick % TICKS_PER_SAMPLE == 0 or tick == first:
                 motion = uav.motion
                 elapsed_s = now - self.from_s
@@ -111,38 +110,40 @@ class EscapeModel:
         tick: int,
         motion: Motion,
         scenario: Scenario,
-        phases: LandingPhases,
+        moments: LandingMoments,
     ) -> None:
-        phases.update(tick / PHYSICS_RATE_HZ, feet_height_m(motion.position_m[2]))
+        moments.update(tick / PHYSICS_RATE_HZ, feet_height_m(motion.position_m[2]))
         if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
             situations = [
-                self._situation(npc.state, npcs, tick, motion, scenario, phases) for npc in npcs
+                self._situation(npc, npcs, tick, motion, scenario, moments) for npc in npcs
             ]
             for npc, situation in zip(npcs, situations, strict=True):
                 npc.decide(situation)
         for npc in npcs:
-            npc.update(tick / PHYSICS_RATE_HZ, phases.began_s, motion.position_m)
+            npc.update(
+                tick / PHYSICS_RATE_HZ, moments.began_s, motion.position_m, motion.velocity_mps
+            )
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ, npcs)
 
     def _situation(
         self,
-        state: NpcState,
+        own: Npc,
         npcs: Sequence[Npc],
         tick: int,
         motion: Motion,
         scenario: Scenario,
-        phases: LandingPhases,
+        moments: LandingMoments,
     ) -> Situation:
         return Situation(
             time_s=tick / PHYSICS_RATE_HZ,
-            self=state,
-            others=tuple(other.state for other in npcs if other.name != state.name),
+            self=own.state,
+            others=tuple(other.state for other in npcs if other is not own),
             uav_position_m=motion.position_m,
             uav_velocity_mps=motion.velocity_mps,
             marker_position_m=self._chase.flight.marker_position_m,
             map=self._chase.map,
             scenario=scenario,
-            phases_s=phases.began_s,
+            moments_s=(*moments.began_s, own.met_s),
         )
 
     def _warm_npcs(self) -> list[Npc]:
@@ -162,8 +163,7 @@ class EscapeModel:
             motion = self._motion(index)
             scenario = environment_at(chase.scenario, chase.flight, tick * TICK_S - 1e-6)
             situations = [
-                self._situation(npc.state, npcs, tick, motion, scenario, self._phases)
-                for npc in npcs
+                self._situation(npc, npcs, tick, motion, scenario, self._moments) for npc in npcs
             ]
             for npc, situation in zip(npcs, situations, strict=True):
                 if number == 0:
@@ -182,13 +182,14 @@ class EscapeModel:
         track = self._chase.flight.uav
         known = self._known_samples
         for each in range(known, index + 1):
-            self._phases.update(
+            self._moments.update(
                 float(track.time_s[each]), feet_height_m(float(track.position_m[each, 2]))
             )
         self._known_samples = max(known, index + 1)
         for npc in npcs:
             uav_m = _vector(track.position_m[index])
-            npc.update(float(track.time_s[index]), self._phases.began_s, uav_m)
+            velocity = _vector(track.velocity_mps[index])
+            npc.update(float(track.time_s[index]), self._moments.began_s, uav_m, velocity)
 
     def _place(self, npcs: Sequence[Npc], index: int) -> None:
         for npc, item in zip(npcs, self._chase.flight.objects, strict=True):

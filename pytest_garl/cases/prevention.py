@@ -40,6 +40,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.land_detector import DETECTED_AFTER_S
+from pytest_garl.simulation.landing_moments import RecordedMoments
 from pytest_garl.simulation.navigation import error_m_at
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
@@ -107,7 +108,7 @@ class Collision:
     def _believed_marker_m(self, time_s: float) -> tuple[float, float]:
         """Return the marker's place in the frame of the UAV's own estimate at a time."""
         x, y = self.flight.marker_position_m
-        dx, dy, _ = error_m_at(self.scenario, time_s)
+        dx, dy, _ = error_m_at(self.scenario, time_s, RecordedMoments(self.flight))
         return x + dx, y + dy
 
     def model(self, from_s: float, world: World) -> EscapeModel:

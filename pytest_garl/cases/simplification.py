@@ -154,8 +154,9 @@ def _reset(values: dict[str, float]) -> Simplification:
     return lambda scenario: scenario.replace(values)
 
 
-CHOICES = tuple(f".{name}" for name, each in STORY.items() if each.quantity.choices)
-"""Ends of the keys of an object's choices, such as its grade: there is nothing between two."""
+CHOICES = (*(f".{name}" for name, each in STORY.items() if each.quantity.choices), ".after")
+"""Ends of the keys of choices, such as the grade of an object and the moment for which an event
+waits: there is nothing between two."""
 OBJECT_PLACES = (
     *("start_x", "start_y", "destination_x", "destination_y"),
     *(f".{name}" for name, each in STORY.items() if each.is_place),

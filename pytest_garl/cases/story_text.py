@@ -6,19 +6,12 @@ import math
 
 from pytest_garl.npcs.grades import GRADE_LIMITS
 from pytest_garl.scenarios.placed import Place, Placed, PlacedNpc
-from pytest_garl.scenarios.story import GRADES, LIMITS_S, PHASES, Story
+from pytest_garl.scenarios.story import GRADES, LIMITS_S, Story, when_in_words
 from pytest_garl.simulation.physics.bird_path import LEAST_HEIGHT_M
 from pytest_garl.verdicts.wording import compass_point
 
 MIDDLE_M = 0.05
 """A crossing that is nearer to the marker's middle is said to be there; texts show decimetres."""
-_PHASES = dict(
-    zip(
-        PHASES,
-        ("the flight begins", "the UAV passes 8 m", "the UAV passes 3 m", "the UAV touches down"),
-        strict=True,
-    )
-)
 
 
 def grade_in_words(grade: str) -> str:
@@ -72,9 +65,7 @@ def _comes(marker_m: Place, npc: PlacedNpc, story: Story, grade: str) -> str:
     origin = f"({x:.1f}, {y:.1f}) m"
     if grade == "hostile":
         return f"is there from the start, at {origin}"
-    when = f"when {_PHASES[PHASES[story.phase]]}"
-    if story.delay_s > 0:
-        when = f"{story.delay_s:.1f} s after {_PHASES[PHASES[story.phase]]}"
+    when = when_in_words(story.phase, story.delay_s)
     if not npc.type.flies:
         return f"sets off from {origin} {when}"
     mx, my = marker_m

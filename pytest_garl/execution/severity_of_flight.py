@@ -6,13 +6,12 @@ import numpy as np
 
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.flight.flight import Contact, Flight, ObjectRecord
-from pytest_garl.flight.landing_phases import LandingPhases
-from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.npcs.grades import GRADE_LIMITS
 from pytest_garl.scenarios.conditions import active_conditions, unread_groups
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import LIMITS_S, Story, story_of
+from pytest_garl.simulation.landing_moments import RecordedMoments
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Verdict
 
@@ -90,7 +89,8 @@ def _interference_s(
     limits = GRADE_LIMITS.get(grade)
     if limits is None or hit is None:
         return 0.0
-    begins_s = story.begins_s(_phases_s(flight)) if story else 0.0
+    moments_s = RecordedMoments(flight).of_npc(hit.name)
+    begins_s = story.begins_s(moments_s) if story else 0.0
     lasts_s = min(story.lasts_s, LIMITS_S[grade]) if story else LIMITS_S[grade]
     time_s, apart_m = hit.track.time_s, hit.track.position_m - flight.uav.position_m
     near = (time_s >= begins_s) & (np.linalg.norm(apart_m, axis=1) <= limits.sees_within_m)
@@ -98,11 +98,3 @@ def _interference_s(
         return 0.0
     noticed_s = float(time_s[int(near.argmax())]) + limits.delay_s
     return round(min(lasts_s, max(0.0, contact.time_s - noticed_s)), CENTIMETRES)
-
-
-def _phases_s(flight: Flight) -> tuple[float, ...]:
-    """Return when the phases of the landing began, from the UAV's track."""
-    phases = LandingPhases()
-    for time_s, height_m in zip(flight.uav.time_s, flight.uav.position_m[:, 2], strict=True):
-        phases.update(float(time_s), feet_height_m(float(height_m)))
-    return phases.began_s

@@ -226,7 +226,9 @@ class Flight:
     and on it.  ``rangefinder`` is the airframe's, None without one.  ``data_read`` names those of
     ``OBSERVED`` that the landing system read in any frame; None for simulators that do not record
     it.  ``conditions`` names what was not nominal in the scenario, such as ``fog`` or
-    ``navigation``; empty for simulators that do not record it.  Both are in no hash.
+    ``navigation``; empty for simulators that do not record it.  ``moments`` are the moments of the
+    landing that came, and when; empty for simulators that do not record them.  The three are in no
+    hash.
     """
 
     outcome: Outcome
@@ -249,6 +251,7 @@ class Flight:
     rangefinder: Rangefinder | None = None
     data_read: tuple[str, ...] | None = None
     conditions: tuple[str, ...] = ()
+    moments: tuple[tuple[str, float], ...] = ()
     sha256: str = ""
     cpu: str = ""
     versions: tuple[tuple[str, str], ...] = ()

@@ -110,6 +110,7 @@ def save(flight: Flight, path: Path) -> None:
         "rangefinder": flight.rangefinder,
         "data_read": flight.data_read,
         "conditions": flight.conditions,
+        "moments": flight.moments,
         "sha256": flight.sha256,
         "cpu": flight.cpu,
         "versions": flight.versions,
@@ -245,6 +246,7 @@ class _Header:
     rangefinder: Rangefinder | None
     data_read: tuple[str, ...] | None
     conditions: tuple[str, ...]
+    moments: tuple[tuple[str, float], ...]
     sha256: str
     cpu: str
     versions: tuple[tuple[str, str], ...]

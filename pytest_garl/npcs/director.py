@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from pytest_garl.npcs.grades import GRADE_LIMITS
 from pytest_garl.npcs.interference import Perception, Sighting
-from pytest_garl.scenarios.story import LIMITS_S, PHASES, Story, story_of
+from pytest_garl.scenarios.groups import DESCENT
+from pytest_garl.scenarios.story import LIMITS_S, Story, story_of
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, NpcState, Situation
 
 Features = NDArray[np.float64]
@@ -48,7 +49,7 @@ FEATURES = (
     "lasts",
     "since_start",
     "since_sight",
-    *(f"since_{phase.replace(' ', '_')}" for phase in PHASES[1:]),
+    *(f"since_{phase.replace(' ', '_')}" for phase in DESCENT[1:]),
     "climbed",
     "held",
     *KINDS,
@@ -61,7 +62,7 @@ All about the UAV is what the NPC believes; 0 if it never saw it.  ``distance`` 
 ``approach``, the UAV's speed towards the NPC, in 3 m/s; ``speed`` is the NPC's, in 8 m/s; ``top``
 and ``bottom`` its heights in 3 m.  ``spare`` is by how much the UAV needs longer down to the NPC's
 top than the NPC to the UAV's column, in 5 s; ``lasts`` how long it will interfere, in 5 s.  Times
-since the start, the first sight and the phases of the landing, for which any story may wait, are
+since the start, the first sight and the moments of the descent, for which any story may wait, are
 shares of :data:`LONG_S`; 0 before.  ``climbed`` and ``held`` are shares of the last decisions in
 which the UAV climbed, or neither climbed nor sank.
 """
@@ -115,7 +116,7 @@ class Watch:
             me.type.name: 1.0,
             self._story.grade: 1.0,
         }
-        for phase, began_s in zip(PHASES[1:], situation.phases_s[1:], strict=True):
+        for phase, began_s in zip(DESCENT[1:], situation.moments_s[1:], strict=False):
             values[f"since_{phase.replace(' ', '_')}"] = _since(began_s, now)
         for name, value in values.items():
             if name in AT:

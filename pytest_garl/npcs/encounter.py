@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from pytest_garl.airframe import Airframe, Camera
 from pytest_garl.flight.flight import Flight, Track
-from pytest_garl.flight.landing_phases import LandingPhases
 from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.npcs.director import Features, Watch
 from pytest_garl.npcs.grades import GRADE_LIMITS
@@ -28,6 +27,7 @@ from pytest_garl.scenarios.object_types import ObjectType
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.projection import CAMERA_BELOW_M
+from pytest_garl.simulation.landing_moments import LandingMoments
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Situation
 from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.vehicle import vehicle_model
@@ -161,11 +161,11 @@ class Passage:
             np.stack([np.interp(times, uav.time_s, column) for column in table.T], axis=1).tolist()
             for table in (uav.position_m, uav.velocity_mps)
         )
-        phases = LandingPhases()
-        self._phases = []
+        moments = LandingMoments()
+        self._moments = []
         for time_s, place in zip(times.tolist(), self._places, strict=True):
-            phases.update(time_s, feet_height_m(place[2]))
-            self._phases.append(phases.began_s)
+            moments.update(time_s, feet_height_m(place[2]))
+            self._moments.append(moments.began_s)
 
     def __enter__(self) -> Self:
         return self
@@ -200,7 +200,9 @@ class Passage:
                 left -= policy.is_over
                 if left < 0:
                     break
-            npc.update(time_s, self._phases[step], (uav_m[0], uav_m[1], uav_m[2]))
+            vx, vy, vz = self._velocities[step]
+            uav_place = (uav_m[0], uav_m[1], uav_m[2])
+            npc.update(time_s, self._moments[step], uav_place, (vx, vy, vz))
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ)
             way.append(npc.position_m)
             away_m = math.dist(npc.position_m[:2], uav_m[:2])
@@ -227,7 +229,7 @@ class Passage:
             marker_position_m=self._marker_m,
             map=self._map,
             scenario=placed.scenario,
-            phases_s=self._phases[step],
+            moments_s=(*self._moments[step], npc.met_s),
         )
 
     def _touches(self, npc: Npc, time_s: float, uav_m: Sequence[float]) -> bool:

@@ -134,7 +134,7 @@ class Interference:
     def look(self, situation: Situation) -> Belief | None:
         """Take a situation in; return what the NPC believes if it decides now."""
         self._perception.update(situation)
-        now, begins_s = situation.time_s, self._story.begins_s(situation.phases_s)
+        now, begins_s = situation.time_s, self._story.begins_s(situation.moments_s)
         if now < begins_s or self._way_out is not None:
             return None
         sighting = self._perception.sighting

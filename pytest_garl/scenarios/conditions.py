@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from pytest_garl.scenarios.genes import SUN
-from pytest_garl.scenarios.groups import GROUPS, WEATHER, WEATHER_CAUSES
+from pytest_garl.scenarios.groups import GROUPS, QUANTITIES, WEATHER, WEATHER_CAUSES
 from pytest_garl.scenarios.light import sun_elevation_deg
 from pytest_garl.scenarios.quantities import UNITS, Group, Quantity, significant, unit_of
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import when_in_words
 from pytest_garl.scenarios.units import TURN
 
 LIGHT_GROUP = "light"
@@ -28,19 +30,21 @@ class ActiveCondition:
     ``share`` (0..1) is how far its strongest value lies from nominal, as a share of all that can be
     flown; 0 if its values are only kinds, directions and times.  ``words`` say that value.
     ``values`` say all that are not nominal; directions and times only if nothing else is there.
+    ``when`` says for an event that waits for a moment of the landing when it begins.
     """
 
     cause: str
     share: float
     words: str
     values: tuple[str, ...]
+    when: str = ""
 
     @property
     def named(self) -> str:
         """Its values in words, ``dirt 30 %``; more than two are counted, ``5 values``."""
-        if len(self.values) > MOST_NAMED:
-            return f"{len(self.values)} values"
-        return ", ".join(self.values)
+        counted = f"{len(self.values)} values"
+        text = counted if len(self.values) > MOST_NAMED else ", ".join(self.values)
+        return f"{self.when}, {text}" if self.when else text
 
 
 def active_conditions(scenario: Scenario) -> tuple[ActiveCondition, ...]:
@@ -55,8 +59,19 @@ def active_conditions(scenario: Scenario) -> tuple[ActiveCondition, ...]:
         # A surveyed pad whose coordinate has no error is as good as it gets.
         is_exact = name == TOLD_GROUP and scenario[TOLD_ERROR] == 0
         if name != LIGHT_GROUP and not is_exact:
-            found += _condition(name, list(_values(scenario, group)))
+            when = _when(scenario, name)
+            found += [
+                dataclasses.replace(each, when=when)
+                for each in _condition(name, list(_values(scenario, group)))
+            ]
     return tuple(found)
+
+
+def _when(scenario: Scenario, group: str) -> str:
+    """Return when an event begins, empty if its time counts from the start of the flight."""
+    key = f"{group}.after"
+    moment = int(QUANTITIES[key].flown(scenario[key])) if key in QUANTITIES else 0
+    return when_in_words(moment, scenario[f"{group}.from_s"]) if moment else ""
 
 
 _CAUSE_OF_WEATHER = {
@@ -118,7 +133,7 @@ def _light(scenario: Scenario) -> list[tuple[float, str]]:
 def _values(scenario: Scenario, group: Group) -> Iterator[tuple[float, str]]:
     for each in group.quantities:
         value = scenario[each.key]
-        if value != each.nominal:
+        if value != each.nominal and each.name != "after":
             yield _share(each, value), _value_in_words(each, value)
 
 

@@ -10,6 +10,12 @@ import math
 
 from pytest_garl.scenarios.quantities import Group, Quantity
 
+MOMENTS = ("start", "8 m", "3 m", "touchdown", "readable", "lost")
+"""What an event or the story of an NPC waits for: the start of the flight; the UAV's descent
+through a height; its touchdown; the first picture in which the marker could be read; the end of the
+first time in which it could (:mod:`pytest_garl.simulation.landing_moments`)."""
+DESCENT = MOMENTS[:4]
+"""Those that the UAV's height tells."""
 FOG_VISIBILITY_M = 10.0
 """Gene 1: below 10 m were reported in the Great Smog of London, 1952."""
 DUST_VISIBILITY_M = 20.0
@@ -202,18 +208,38 @@ NAVIGATION = Group(
         ),
     ),
 )
+
+
+def _after(event: str) -> Quantity:
+    return Quantity(
+        key=f"{event}.after",
+        even=True,
+        low=0.0,
+        high=len(MOMENTS) - 1.0,
+        whole=True,
+        choices=MOMENTS,
+        meaning="the moment of the landing from which from_s counts",
+        source="what goes wrong depends on what the UAV does when it happens, not on the clock",
+    )
+
+
+def _begin(event: str) -> Quantity:
+    return Quantity(
+        key=f"{event}.from_s",
+        even=True,
+        low=0.0,
+        high=300.0,
+        meaning="when it begins, after its moment",
+        source="a landing takes some 10 to 40 s",
+    )
+
+
 JUMP = Group(
     name="jump",
     meaning="a jump of the estimated position",
     quantities=(
-        Quantity(
-            key="jump.from_s",
-            low=0.0,
-            high=300.0,
-            even=True,
-            meaning="when it jumps, after the start of the flight",
-            source="a landing takes some 10 to 40 s",
-        ),
+        _after("jump"),
+        _begin("jump"),
         Quantity(
             key="jump.distance_m",
             low=0.0,
@@ -475,17 +501,6 @@ def _decoy(number: int) -> Group:
 DECOYS = tuple(_decoy(number) for number in (1, 2, 3))
 
 
-def _begin(event: str) -> Quantity:
-    return Quantity(
-        key=f"{event}.from_s",
-        even=True,
-        low=0.0,
-        high=300.0,
-        meaning="when it begins, after the start of the flight",
-        source="a landing takes some 10 to 40 s",
-    )
-
-
 def _lasts(event: str, source: str) -> Quantity:
     return Quantity(
         key=f"{event}.lasts_s", low=0.0, high=60.0, meaning="how long it lasts", source=source
@@ -496,6 +511,7 @@ OUTAGE = Group(
     name="outage",
     meaning="a camera that fails for some seconds",
     quantities=(
+        _after("outage"),
         _begin("outage"),
         _lasts(
             "outage",
@@ -517,6 +533,7 @@ BURST = Group(
     name="burst",
     meaning="a burst of delay: frames queue up and arrive late, in order",
     quantities=(
+        _after("burst"),
         _begin("burst"),
         _lasts("burst", "PX4, PLD_BTOUT: a landing target counts as lost after 5 s"),
         Quantity(
@@ -532,6 +549,7 @@ COVER = Group(
     name="cover",
     meaning="a tarpaulin that lies over a part of the marker for some seconds",
     quantities=(
+        _after("cover"),
         _begin("cover"),
         _lasts(
             "cover",

@@ -40,10 +40,11 @@ class Quantity:
     ``high`` are the limits of what the simulator can fly, or within them those of a genome.
     ``source`` says where the range of the domain `field` comes from.  A value of a ``whole`` one
     is rounded.  ``choices`` name the whole values from 0 on; such a value is rounded up: only 0 is
-    the first.  Files and reports state the name.  An ``even`` one has no harsher end, as a
-    direction or a time, and is drawn evenly; of any other one half of the draws of a sparse genome
-    lie in the third that is farthest from nominal.  ``scale`` is "inverse" for a visibility, whose
-    effect grows with 1 / value: it is strongest at ``low``, and infinite without effect.
+    the first, unless it is ``whole`` as well.  Files and reports state the name.  An ``even`` one
+    has no harsher end, as a direction or a time, and is drawn evenly; of any other one half of the
+    draws of a sparse genome lie in the third that is farthest from nominal.  ``scale`` is "inverse"
+    for a visibility, whose effect grows with 1 / value: it is strongest at ``low``, and infinite
+    without effect.
     """
 
     key: str
@@ -96,13 +97,13 @@ class Quantity:
 
     def flown(self, value: float) -> float:
         """Return what is flown for a value: a whole one is rounded, a choice rounded up."""
-        if self.choices:
-            return float(math.ceil(value))
-        return float(round(value)) if self.whole else value
+        if self.whole:
+            return float(round(value))
+        return float(math.ceil(value)) if self.choices else value
 
     def text_of(self, value: float) -> str:
         """Return a value for a reader: the name of a choice, or the number."""
-        return self.choices[math.ceil(value)] if self.choices else f"{value:g}"
+        return self.choices[int(self.flown(value))] if self.choices else f"{value:g}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

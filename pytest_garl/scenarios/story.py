@@ -9,14 +9,25 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pytest_garl.scenarios.groups import MOMENTS
 from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 
 GRADES = ("careless", "curious", "chasing", "hostile")
 """Grades of behaviour from the weakest to the strongest (:mod:`pytest_garl.npcs.grades`)."""
-PHASES = ("start", "8 m", "3 m", "touchdown")
-"""What a story waits for: the start of the flight, the UAV's descent through a height, its
-touchdown.  The delay counts from there."""
+MET = "met"
+STORY_MOMENTS = (*MOMENTS, MET)
+"""What a story waits for: a moment of the landing, or the last one at which the NPC can still reach
+the UAV before that is down where the NPC is.  The delay counts from there."""
+_IN_WORDS = (
+    "the flight begins",
+    "the UAV passes 8 m",
+    "the UAV passes 3 m",
+    "the UAV touches down",
+    "the marker can be read for the first time",
+    "the marker can no longer be read",
+    "it can just meet the UAV",
+)
 CURIOUS_S = 20.0
 """Longest interference of a curious NPC: engineering estimate of how long somebody looks at a UAV
 that lands before walking on."""
@@ -109,16 +120,16 @@ STORY: Mapping[str, StoryValue] = {
         ),
         _chosen(
             "phase",
-            PHASES,
-            meaning="what it waits for before it comes",
-            source="the phases of a landing",
+            STORY_MOMENTS,
+            meaning="the moment for which it waits before it comes",
+            source="what goes wrong depends on what the UAV does when an NPC comes",
         ),
         _value(
             "delay_s",
             low=0.0,
             high=120.0,
             draws=(0.0, 20.0),
-            meaning="how long after its phase it comes",
+            meaning="how long after its moment it comes",
             source="a descent from 10 m takes 10 to 20 s",
         ),
         _value(
@@ -173,9 +184,10 @@ LIMITS_S = {"careless": 0.0, "curious": CURIOUS_S, "chasing": CHASE_S, "hostile"
 class Story:
     """What one NPC does in a flight.
 
-    It comes ``delay_s`` after ``phase``.  A careless one goes straight through ``crossing_m``,
-    relative to the marker, stands there for ``pause_s``, goes on and leaves.  One that interferes
-    does so for ``lasts_s`` and leaves.  A hostile one attacks during the whole flight.
+    It comes ``delay_s`` after its moment: ``phase`` is its number in :data:`STORY_MOMENTS`.  A
+    careless one goes straight through ``crossing_m``, relative to the marker, stands there for
+    ``pause_s``, goes on and leaves.  One that interferes does so for ``lasts_s`` and leaves.  A
+    hostile one attacks during the whole flight.
     """
 
     grade: str
@@ -187,9 +199,16 @@ class Story:
     stoop_m: float = 0.0
     is_child: bool = False
 
-    def begins_s(self, phases_s: tuple[float, ...]) -> float:
-        """Return when it comes, for the times of the phases so far; infinite if nobody knows."""
-        return phases_s[self.phase] + self.delay_s
+    def begins_s(self, moments_s: tuple[float, ...]) -> float:
+        """Return when it comes, for the times of the moments so far; infinite if nobody knows."""
+        return moments_s[self.phase] + self.delay_s
+
+
+def when_in_words(moment: int, delay_s: float) -> str:
+    """Return a time after one of :data:`STORY_MOMENTS`: ``2.0 s after the UAV passes 3 m``."""
+    return (
+        f"{delay_s:.1f} s after {_IN_WORDS[moment]}" if delay_s > 0 else f"when {_IN_WORDS[moment]}"
+    )
 
 
 def story_of(scenario: Scenario, name: str) -> Story | None:

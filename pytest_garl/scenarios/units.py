@@ -211,14 +211,15 @@ def conditions_in_words(scenario: Scenario, map: Map) -> list[tuple[str, str]]:
         words = f"sun at an elevation of {elevation:.0f} degrees, azimuth {azimuth:.0f} degrees"
         found.append(("light", words))
     found += [
-        (key, _in_words(scenario[key], each))
+        (key, _in_words(scenario, each))
         for key, each in QUANTITIES.items()
         if key != TURN and scenario[key] != each.nominal
     ]
     return found
 
 
-def _in_words(value: float, quantity: Quantity) -> str:
+def _in_words(scenario: Scenario, quantity: Quantity) -> str:
+    value = scenario[quantity.key]
     if quantity.choices:
         return quantity.text_of(value)
     return f"{f'{value:g} {quantity.unit}'.rstrip()}: {quantity.meaning}"

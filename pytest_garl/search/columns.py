@@ -22,9 +22,9 @@ class OptionalGene:
     """An optional gene: its columns, and what is special about it.
 
     ``bit`` is the column of its bit of activity, ``values`` those behind it.  ``grade_column`` is
-    that of an NPC's grade, ``begins_column`` that of an event's begin, ``lasts_column`` that of how
-    long it lasts, ``place_column`` that of a decoy's place to the east, before that to the north;
-    -1 without one.
+    that of an NPC's grade, ``begins_column`` that of an event's begin, ``after_column`` that of the
+    moment from which this counts, ``lasts_column`` that of how long it lasts, ``place_column`` that
+    of a decoy's place to the east, before that to the north; -1 without one.
     """
 
     name: str
@@ -33,6 +33,7 @@ class OptionalGene:
     is_npc: bool
     grade_column: int = -1
     begins_column: int = -1
+    after_column: int = -1
     lasts_column: int = -1
     place_column: int = -1
 
@@ -121,6 +122,7 @@ def _optional_gene(gene: NuclearGene, first: int) -> OptionalGene:
         is_npc=f"{gene.name}.velocity" in keys,
         grade_column=column("grade"),
         begins_column=column("from_s"),
+        after_column=column("after"),
         lasts_column=column("lasts_s"),
         # A domain may take away one of the two.
         place_column=column("x_m") if column("y_m") >= 0 else -1,

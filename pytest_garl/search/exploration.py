@@ -28,6 +28,9 @@ when another comes.  Most failures of distributed systems take two or three even
 (Yuan et al., Simple Testing Can Prevent Most Critical Failures, OSDI 2014)."""
 COINCIDENT_SHARE = 0.5
 """Share of the events in a scenario with an earlier one that begin while that one lasts."""
+AFTER_MOMENT_S = 5.0
+"""An event that waits for a moment of the landing begins at most so long after it: each moment is
+followed by the next one within seconds (a descent from 8 m to 3 m takes some 5 s)."""
 
 
 class Exploration:
@@ -131,12 +134,16 @@ class Exploration:
         return order[:count]
 
     def while_flying(self, gene: OptionalGene, values: Matrix) -> Matrix:
-        """Return values whose event begins before a flight ends."""
+        """Return values whose event begins before a flight ends, or soon after its moment."""
         if gene.begins_column < 0:
             return values
+        first = gene.values.start
+        # The start of the flight is moment 0.
+        waits = gene.after_column >= 0 and round(float(values[gene.after_column - first])) > 0
+        latest_s = min(self.flight_s, AFTER_MOMENT_S) if waits else self.flight_s
         low, high = self._columns.lower[gene.begins_column], self._columns.upper[gene.begins_column]
-        share = min(1.0, max(0.0, self.flight_s - low) / (high - low))
-        moved, index = values.copy(), gene.begins_column - gene.values.start
+        share = min(1.0, max(0.0, latest_s - low) / (high - low))
+        moved, index = values.copy(), gene.begins_column - first
         moved[index] = low + share * (values[index] - low)
         return moved
 
@@ -150,6 +157,8 @@ class Exploration:
                 continue
             begin = row[first.begins_column] - self._lasts(second, row)
             end = row[first.begins_column] + self._lasts(first, row)
+            if min(first.after_column, second.after_column) >= 0:
+                row[second.after_column] = row[first.after_column]
             column = second.begins_column
             low, high = self._columns.lower[column], self._columns.upper[column]
             row[column] = np.clip(rng.uniform(begin, end), low, high)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pytest_garl.flight.detectability import READABLE, readable_probability
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.landing_system import Camera
@@ -30,8 +31,8 @@ from pytest_garl.scenarios.validity import problems, repair
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.true_camera import true_camera
+from pytest_garl.simulation.landing_moments import LandingMoments
 from pytest_garl.simulation.nominal import LEVEL
-from pytest_garl.verdicts.detectability import READABLE, readable_probability
 from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.verdict import Limits, Verdict
 from pytest_garl.verdicts.wording import compass_point, headline
@@ -259,7 +260,7 @@ def _thick_air(twin: Flight, clear: Scenario, map: Map, camera: Camera) -> _Made
 def _readable_from_m(scenario: Scenario, map: Map, camera: Camera, top_m: float) -> float:
     """Return the greatest height above the marker from which it can be read; 0 from none."""
     placed = Placed(scenario, map)
-    renderer = renderer_of(placed, true_camera(camera, scenario), colour=False)
+    renderer = renderer_of(placed, true_camera(camera, scenario), LandingMoments(), colour=False)
     for step in range(HEIGHTS, 0, -1):
         height = top_m * step / HEIGHTS
         frame = renderer.render(eye_under((*placed.marker_m, height), LEVEL), LEVEL, 0.0, [])

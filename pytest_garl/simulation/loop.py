@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from pytest_garl.flight.flight import Crash, Flight, Outcome
-from pytest_garl.flight.landing_phases import LandingPhases
 from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, GRAVITY_MPS2, feet_height_m
 from pytest_garl.landing_system import Abort, Command, Land, VehicleState, VelocitySetpoint
 from pytest_garl.scenarios.bodies import rotate
@@ -79,16 +78,18 @@ class Loop:
         )
         self._thrusts, self._command = begin_at_start(self._world, self._model, placed)
         self.recorder = Recorder(placed, self.npcs)
+        self.moments = self.recorder.moments
         stays = GroundStays(self.recorder, self._model, placed.marker_m, self._under)
         self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m, stays)
         self._control = FlightControl(self._model)
         self._wind = Wind(scenario, map.ground.texture)
-        self._navigation = Navigation(scenario)
+        self._navigation = Navigation(scenario, self.moments)
         self._wanted_thrusts = NO_THRUST
         self._pending: list[tuple[int, Command]] = []
         ranging = Ranging(scenario, self._system.airframe.rangefinder, self._world)
-        self._sensors = Sensors(scenario, self.camera, self.recorder, self.npcs, ranging)
-        self.phases = LandingPhases()
+        self._sensors = Sensors(
+            scenario, self.camera, self.recorder, self.npcs, ranging, self.moments
+        )
         self._ticks = 0
         self._ticks_per_control = _ticks_per_call(self._system.airframe.control_rate_hz)
 
@@ -157,8 +158,8 @@ class Loop:
         if not math.isfinite(sum(position) + sum(attitude) + sum(velocity) + sum(spin)):
             raise self._system.not_finite_error(now)
         if tick % TICKS_PER_NPC_STEP == 0:
-            self.phases.update(now, feet_height_m(position[2]))
-            self._move_npcs(tick, position)
+            self.moments.update(now, feet_height_m(position[2]))
+            self._move_npcs(tick, position, velocity)
         if tick % TICKS_PER_TRACK_SAMPLE == 0:
             self._contacts.record_pose(now)
             if isinstance(self._command, Abort) and self._contacts.gave_up(position):
@@ -198,12 +199,12 @@ class Loop:
             self._wanted_thrusts = self._system.control(state, self._model.max_thrust_n)
         return self._wanted_thrusts
 
-    def _move_npcs(self, tick: int, uav_m: Vector) -> None:
+    def _move_npcs(self, tick: int, uav_m: Vector, uav_mps: Vector) -> None:
         if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
             moves = [npc.decide(self.situation(npc)) for npc in self.npcs]
             self._change([change for move in moves for change in move.changes])
         for npc in self.npcs:
-            npc.update(self.recorder.time_s, self.phases.began_s, uav_m)
+            npc.update(self.recorder.time_s, self.moments.began_s, uav_m, uav_mps)
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ, self.npcs)
             self._world.move(npc.name, npc.position_m, npc.yaw_rad, npc.velocity_mps)
 
@@ -225,7 +226,7 @@ class Loop:
             marker_position_m=self._placed.marker_m,
             map=self.map,
             scenario=self.scenario,
-            phases_s=self.phases.began_s,
+            moments_s=(*self.moments.began_s, npc.met_s),
         )
 
     def _under(self, place: tuple[float, float]) -> str:

@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass, field
 
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.events import Beginning, Moments
 from pytest_garl.simulation.physics.vehicle import Motion, Quaternion, Vector
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
 from pytest_garl.simulation.randomness import generator
@@ -54,9 +55,9 @@ class _Wandering:
             self.error[index] += rate * _TICK_S
 
 
-def error_m_at(scenario: Scenario, time_s: float) -> Vector:
+def error_m_at(scenario: Scenario, time_s: float, moments: Moments) -> Vector:
     """Return the error of the estimated position at a time of a scenario's flight."""
-    navigation = Navigation(scenario)
+    navigation = Navigation(scenario, moments)
     rest = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
     for tick in range(round(time_s * PHYSICS_RATE_HZ) + 1):
         navigation.estimate(tick, rest)
@@ -66,7 +67,7 @@ def error_m_at(scenario: Scenario, time_s: float) -> Vector:
 class Navigation:
     """The estimate of the UAV's motion; call ``estimate`` for each step of the physics."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, moments: Moments) -> None:
         def value(name: str) -> float:
             return scenario[f"navigation.{name}"]
 
@@ -95,7 +96,7 @@ class Navigation:
         self._errs = bool(self._parts)
         jump, over = scenario["jump.distance_m"], math.radians(scenario["jump.towards_deg"])
         self._jump_m = jump * math.cos(over), jump * math.sin(over)
-        self._jump_tick = round(scenario["jump.from_s"] * PHYSICS_RATE_HZ)
+        self._jumps = Beginning(scenario, "jump", moments)
         self._jumped = False
         self._rng = generator(scenario.seed, "navigation")
 
@@ -108,8 +109,9 @@ class Navigation:
 
     def estimate(self, tick: int, motion: Motion) -> Motion:
         """Return the estimate of a motion, itself if nothing errs."""
-        if tick >= self._jump_tick and any(self._jump_m):
-            self._jumped = True
+        if not self._jumped and any(self._jump_m):
+            begins_s = self._jumps.time_s
+            self._jumped = math.isfinite(begins_s) and tick >= round(begins_s * PHYSICS_RATE_HZ)
         if not self._errs and not self._jumped:
             return motion
         if self._errs and tick:

@@ -28,6 +28,7 @@ from pytest_garl.simulation.camera.solids import BodyPose
 from pytest_garl.simulation.camera.true_camera import Mounting, true_camera
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.events import Event
+from pytest_garl.simulation.landing_moments import RecordedMoments
 from pytest_garl.simulation.system_under_test.descent import LAND_BELOW_M, SLOW_BELOW_M
 from pytest_garl.simulation.system_under_test.mission import SEARCH_ALTITUDE_M
 from pytest_garl.simulation.system_under_test.reference_pilot import CRUISE_MPS, DESCENT_MPS
@@ -80,15 +81,15 @@ def nominal_views(flight: Flight, placed: Placed, camera: Camera) -> tuple[Nomin
     """Return the views of a nominal landing in the scenario that was flown.
 
     The objects are where they were at that time of the flight, or at its end if it had ended; the
-    environment is that to which NPC policies had changed it.  The UAV's own path plays no part.
-    A camera that fails shows nothing.  Later attempts are those whose descent ends before the
+    environment is that to which NPC policies had changed it.  The UAV's own path plays no part, but
+    that an event came when it did.  A camera that fails shows nothing.  Later attempts are those whose descent ends before the
     system gave up, or before the time was up.  The camera is the true one, turned and dirty as the
     scenario says; it hovers while it looks, so that a long exposure does not blur.
     """
-    scenario = placed.scenario
-    renderer = renderer_of(placed, true_camera(camera, scenario), colour=False)
+    scenario, moments = placed.scenario, RecordedMoments(flight)
+    renderer = renderer_of(placed, true_camera(camera, scenario), moments, colour=False)
     attitude = Mounting(scenario).attitude(LEVEL)
-    shown, views, outage = scenario, [], Event(scenario, "outage")
+    shown, views, outage = scenario, [], Event(scenario, "outage", moments)
     for look in _looks(placed, _waits_until_s(flight, scenario)):
         present = environment_at(scenario, flight, look.time_s)
         if present != shown:

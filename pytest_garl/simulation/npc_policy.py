@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from pytest_garl.errors import PolicyError
 from pytest_garl.scenarios.genes import ENVIRONMENT
+from pytest_garl.scenarios.story import STORY_MOMENTS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 DECISION_STEP_S = 0.5
 """Time between two decisions of a policy (paper, section 3.4: "0.5 seconds")."""
+NO_MOMENT_CAME = (0.0, *(math.inf for _ in STORY_MOMENTS[1:]))
+"""The moments at the start of a flight."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,8 +54,9 @@ class Situation:
     """The input of a policy that decides for one NPC: the exact state of everything.
 
     ``self`` is that NPC, ``others`` are all other NPCs.  ``scenario`` holds all genes, with those
-    of the environment as they are at the moment.  ``phases_s`` are the times at which the phases of
-    the landing began so far (:data:`~pytest_garl.scenarios.story.PHASES`), infinite for the others.
+    of the environment as they are at the moment.  ``moments_s`` are the times at which the moments
+    of the landing came so far (:data:`~pytest_garl.scenarios.story.STORY_MOMENTS`), infinite for
+    the others.
     """
 
     time_s: float
@@ -63,7 +67,7 @@ class Situation:
     marker_position_m: tuple[float, float]
     map: Map
     scenario: Scenario
-    phases_s: tuple[float, ...] = (0.0, math.inf, math.inf, math.inf)
+    moments_s: tuple[float, ...] = NO_MOMENT_CAME
 
 
 GeneChange = tuple[str, float]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +28,7 @@ from pytest_garl.landing_system import Command
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Renderer
+from pytest_garl.simulation.landing_moments import LandingMoments, met_by
 from pytest_garl.simulation.physics.npc import Npc
 
 Vector = tuple[float, float, float]
@@ -65,6 +66,7 @@ class Recorder:
         self._events: list[Event] = []
         self._steps: list[Step] = []
         self._phase = ""
+        self.moments = LandingMoments()
         self.data_read: set[str] = set()
         """Names of the data that the landing system read."""
 
@@ -147,6 +149,7 @@ class Recorder:
         ``error_m`` is the error of the position that the system was told, ``range_m`` the reading
         of its rangefinder.
         """
+        self.moments.see(self.time_s, sight.marker)
         diagnostics = command.diagnostics
         if diagnostics and diagnostics.phase != self._phase:
             self._phase = diagnostics.phase
@@ -165,6 +168,12 @@ class Recorder:
                 rangefinder_m=range_m,
             )
         )
+
+    def _met(self) -> Iterator[tuple[str, float]]:
+        """Yield when each NPC could just meet the UAV."""
+        for item in self._objects:
+            if math.isfinite(item.met_s):
+                yield met_by(item.name), item.met_s
 
     def flight(
         self, outcome: Outcome, crash: Crash | None, touchdowns: Sequence[Touchdown]
@@ -206,6 +215,7 @@ class Recorder:
             touchdown=touchdowns[-1] if touchdowns else None,
             earlier_touchdowns=tuple(touchdowns[:-1]),
             data_read=tuple(name for name in OBSERVED if name in self.data_read),
+            moments=(*self.moments.record, *self._met()),
         )
 
 

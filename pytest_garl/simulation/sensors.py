@@ -17,7 +17,7 @@ from pytest_garl.simulation.camera.frame import Frame, blank_frame
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.camera.true_camera import Mounting, true_camera
-from pytest_garl.simulation.events import Event
+from pytest_garl.simulation.events import Event, Moments
 from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.vehicle import Motion, Vector
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
@@ -62,11 +62,13 @@ class Sensors:
         recorder: Recorder,
         npcs: Sequence[Npc],
         ranging: Ranging,
+        moments: Moments,
     ) -> None:
         self._camera, self._recorder, self._npcs = camera, recorder, npcs
-        self._ranging = ranging
-        self._timing, self._mounting = Timing(scenario), Mounting(scenario)
-        self._outage, self._freezes = Event(scenario, "outage"), scenario["outage.frozen"] > 0
+        self._ranging, self._moments = ranging, moments
+        self._timing, self._mounting = Timing(scenario, moments), Mounting(scenario)
+        self._outage = Event(scenario, "outage", moments)
+        self._freezes = scenario["outage.frozen"] > 0
         self._rng = generator(scenario.seed, "pose")
         self._renderer: Renderer | None = None
         self._depth: DepthSensor | None = None
@@ -79,7 +81,7 @@ class Sensors:
     def switch_on(self, placed: Placed) -> None:
         """Switch the camera on; without it frames are black and show nothing."""
         camera = true_camera(self._camera, placed.scenario)
-        self._renderer = renderer_of(placed, camera)
+        self._renderer = renderer_of(placed, camera, self._moments)
         self._depth = DepthSensor(placed.scenario, camera)
 
     def change(self, scenario: Scenario) -> None:

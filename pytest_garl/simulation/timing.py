@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.events import Event
+from pytest_garl.simulation.events import Event, Moments
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
 from pytest_garl.simulation.randomness import generator
 
@@ -15,12 +15,13 @@ class Timing:
     is that comes with it.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, moments: Moments) -> None:
         self._latency_ms = scenario["timing.latency_ms"]
         self._jitter_ms = scenario["timing.jitter_ms"]
         self._lost_share = scenario["timing.dropped_percent"] / 100
         self.stamp_ticks = _ticks(scenario["timing.stamp_error_ms"])
-        self._burst, self._burst_ms = Event(scenario, "burst"), scenario["burst.latency_ms"]
+        self._burst = Event(scenario, "burst", moments)
+        self._burst_ms = scenario["burst.latency_ms"]
         self._rng = generator(scenario.seed, "timing")
         self._last_arrival = 0
 

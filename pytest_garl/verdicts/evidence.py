@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
+from pytest_garl.flight.detectability import READABLE, readable_probability
 from pytest_garl.flight.flight import Contact, Flight, Step, Touchdown
 from pytest_garl.flight.thresholds import SLID_M
-from pytest_garl.verdicts.detectability import READABLE, readable_probability
 from pytest_garl.verdicts.touchdowns import Stay, off_in_track, stays_of
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, NO_LANDING, Limits
 

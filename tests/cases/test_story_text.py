@@ -4,7 +4,7 @@ import pytest
 
 from pytest_garl.cases.story_text import grade_in_words, story_in_words
 from pytest_garl.scenarios.placed import Placed
-from pytest_garl.scenarios.story import GRADES, PHASES
+from pytest_garl.scenarios.story import GRADES, STORY_MOMENTS
 from tests.cases.samples import case
 from tests.support.stories import EMPTY, scenario_with
 
@@ -72,7 +72,7 @@ def test_story_is_told_only_if_the_policy_follows_it() -> None:
 def test_every_grade_and_every_phase_has_words() -> None:
     assert all(grade_in_words(grade).startswith("it ") for grade in GRADES)
     assert grade_in_words("") == ""
-    for phase in range(len(PHASES)):
+    for phase in range(len(STORY_MOMENTS)):
         told = {"grade": 0.0, "phase": float(phase)}
         scenario = scenario_with("dog-1", (3.0, 4.0), 6.0, told)
         assert " when " in story_in_words(Placed(scenario, EMPTY), "dog-1")

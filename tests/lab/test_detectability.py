@@ -10,7 +10,7 @@ import pytest
 from lab.detectability import COLUMNS, features_of, half_of, table_of
 from lab.detectability_fit import auc, brier, deciles, fit, tenths
 from lab.detectability_frames import FRAMES, MAPS, Detectors, ReadFrame, read_frames
-from pytest_garl.verdicts.detectability import readable_probability
+from pytest_garl.flight.detectability import readable_probability
 
 FRESH = range(900_000, 900_024)
 """Scenarios that the study does not draw."""

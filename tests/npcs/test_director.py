@@ -76,7 +76,7 @@ def test_the_numbers_say_who_waits_and_for_how_long() -> None:
     assert number(row, "since_start") == pytest.approx(12.0 / 20)
     assert number(row, "since_sight") == pytest.approx(2.0 / 20), "seen with the second decision"
     assert number(row, "since_3_m") == 0
-    low = dataclasses.replace(moment, phases_s=(0.0, 8.0, 9.0, math.inf))
+    low = dataclasses.replace(moment, moments_s=(0.0, 8.0, 9.0, math.inf))
     row = seen(Watch(low, CHASING), low, times=1)
     assert number(row, "since_8_m") > number(row, "since_3_m") > 0
 
@@ -125,7 +125,7 @@ def test_the_rule_waits_for_a_uav_that_flies_in_or_holds() -> None:
 
 def test_one_that_sees_nothing_goes_some_time_after_the_uav_is_low() -> None:
     far = person(25.0, time_s=12.0)
-    low = dataclasses.replace(far, phases_s=(0.0, 8.0, 10.0, math.inf))
+    low = dataclasses.replace(far, moments_s=(0.0, 8.0, 10.0, math.inf))
     for after_s, goes in ((1.0, True), (2.0, True), (2.5, False)):
         row = Watch(low, CHASING).look(low)
         assert TimeToGo(unseen_s=after_s).decides(row) is goes

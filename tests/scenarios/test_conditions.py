@@ -73,3 +73,12 @@ def test_place_or_direction_is_not_named_beside_anything_else(
 ) -> None:
     (found,) = active_conditions(NOMINAL.replace(values))
     assert found.named == named
+
+
+def test_an_event_that_waits_for_a_moment_says_when_it_begins() -> None:
+    cover = {"cover.lasts_s": 3.0, "cover.share_percent": 80.0, "cover.from_s": 1.0}
+    (timed,) = active_conditions(NOMINAL.replace(cover))
+    assert timed.named == "lasts 3 s, share 80 %"
+    (tied,) = active_conditions(NOMINAL.replace(cover | {"cover.after": 5.0}))
+    assert tied.named == "1.0 s after the marker can no longer be read, lasts 3 s, share 80 %"
+    assert tied.values == timed.values

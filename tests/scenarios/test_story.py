@@ -113,3 +113,14 @@ def test_a_grade_beyond_the_domain_is_named() -> None:
     assert not [
         each for each in calm.outside(drawn(1)[0].without("bird-1"), LAWN) if "hostile" in each
     ]
+
+
+def test_a_file_states_the_moment_of_an_event() -> None:
+    tied = {"outage.after": 4.0, "outage.from_s": 1.5, "outage.lasts_s": 2.0}
+    scenario = repair(scenario_with("dog-1", (5.0, 5.0), 4.0, {}).replace(tied), LAWN)
+    text = dumps(scenario, LAWN)
+    assert 'after = "readable"' in text
+    assert loads(text, LAWN) == scenario
+    assert "after" not in dumps(repair(scenario.replace({"outage.after": 0.0}), LAWN), LAWN)
+    with pytest.raises(ScenarioError, match="expected one of start, 8 m, 3 m, touchdown"):
+        loads(text.replace('"readable"', '"seen"'), LAWN)

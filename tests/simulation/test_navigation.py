@@ -14,6 +14,7 @@ from pytest_garl import Abort, Airframe, Command, Mission, Observation, VehicleS
 from pytest_garl.landing_system import MotorThrusts
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.landing_moments import LandingMoments
 from pytest_garl.simulation.navigation import LAG_S, MOST_RATE_MPS, Navigation, error_m_at
 from pytest_garl.simulation.physics.vehicle import Motion
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
@@ -27,7 +28,7 @@ REST = Motion((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), LEVEL, (0.0, 0.0, 0.0))
 def estimates(seconds: float, seed: int = 5, **genes: float) -> list[Motion]:
     """Return what navigation says of a UAV at rest, for each step of the physics."""
     named = {key if "__" in key else f"navigation__{key}": each for key, each in genes.items()}
-    navigation = Navigation(dataclasses.replace(nominal(**named), seed=seed))
+    navigation = Navigation(dataclasses.replace(nominal(**named), seed=seed), LandingMoments())
     ticks = range(round(seconds * PHYSICS_RATE_HZ))
     return [navigation.estimate(tick, REST) for tick in ticks]
 
@@ -50,7 +51,7 @@ def test_the_error_has_its_root_mean_square_and_its_correlation_time() -> None:
     # Small enough that the largest rate does not matter.
     genes = {"position_m": 0.5, "correlation_s": 30.0}
     named = {f"navigation__{key}": each for key, each in genes.items()}
-    navigation, places = Navigation(nominal(**named)), []
+    navigation, places = Navigation(nominal(**named), LandingMoments()), []
     for tick in range(4000 * PHYSICS_RATE_HZ):
         motion = navigation.estimate(tick, REST)
         if tick % PHYSICS_RATE_HZ == 0:
@@ -75,8 +76,10 @@ def test_the_error_at_a_time_is_that_of_the_flight() -> None:
     flown = errors_m(
         estimates(10.0, position_m=2.0, correlation_s=30.0, jump__distance_m=1.0, seed=5)
     )
-    assert error_m_at(scenario, 9.0) == pytest.approx(tuple(flown[9 * PHYSICS_RATE_HZ]))
-    assert math.dist(error_m_at(scenario, 0.0), (3.0, 0.0, 0.0)) < 1e-6
+    start = LandingMoments()
+    expected = pytest.approx(tuple(flown[9 * PHYSICS_RATE_HZ]))
+    assert error_m_at(scenario, 9.0, start) == expected
+    assert math.dist(error_m_at(scenario, 0.0, start), (3.0, 0.0, 0.0)) < 1e-6
 
 
 def test_the_estimated_velocity_is_the_derivative_of_the_estimated_position() -> None:

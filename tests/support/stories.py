@@ -10,6 +10,7 @@ import numpy as np
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.groups import MOMENTS
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placed import Placed, start_genes
@@ -50,34 +51,35 @@ def walk(
     *,
     seconds: float,
     uav: Callable[[float], Vector] = lambda time_s: (0.0, 0.0, 9.0),
-    phases: tuple[float, ...] = (0.0, NEVER, NEVER, NEVER),
+    moments: tuple[float, ...] = (0.0, NEVER, NEVER, NEVER),
     policy: NpcPolicy | None = None,
+    uav_mps: Vector = (0.0, 0.0, 0.0),
     map: Map = EMPTY,
 ) -> np.ndarray:
     """Return the NPC's place (n, 3) at each tick of 1/60 s; it stays where it is between two."""
     placed = Placed(scenario, map)
     npc = Npc(placed, name, policy or policy_spec("graded").make())
     places = []
+    came_s = (*moments, *(NEVER for _ in MOMENTS[len(moments) :]))
     for tick in range(round(seconds / TICK_S)):
         now = tick * TICK_S
+        known = tuple(each if each <= now else NEVER for each in came_s)
         if tick % round(DECISION_STEP_S / TICK_S) == 0:
-            known = tuple(each if each <= now else NEVER for each in phases)
             situation = Situation(
                 time_s=now,
                 self=npc.state,
                 others=(),
                 uav_position_m=uav(now),
-                uav_velocity_mps=(0.0, 0.0, 0.0),
+                uav_velocity_mps=uav_mps,
                 marker_position_m=(0.0, 0.0),
                 map=placed.map,
                 scenario=scenario,
-                phases_s=known,
+                moments_s=(*known, npc.met_s),
             )
             if tick == 0:
                 npc.policy.reset(situation, np.random.default_rng(0))
             npc.decide(situation)
-        known = tuple(each if each <= now else NEVER for each in phases)
-        npc.update(now, known, uav(now))
+        npc.update(now, known, uav(now), uav_mps)
         npc.advance(TICK_S)
         places.append(npc.position_m)
     return np.array(places)

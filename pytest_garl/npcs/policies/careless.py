@@ -37,7 +37,7 @@ class Careless:
     def decide(self, situation: Situation) -> Move:
         """Go straight to the crossing, stand, go straight on."""
         now, story = situation.time_s, self._story
-        if now < story.begins_s(situation.phases_s):
+        if now < story.begins_s(situation.moments_s):
             return STAY
         if self._way_out is not None:
             return self._way_out.decide(situation)

@@ -34,6 +34,7 @@ from pytest_garl.npcs.minds import Intercepting
 from pytest_garl.npcs.training.graded_landing import GradedLanding, draw_graded_landing
 from pytest_garl.npcs.training.presets import Surrogate
 from pytest_garl.npcs.training.uav_models import MOST_CAUTIOUS_M
+from pytest_garl.scenarios.groups import DESCENT
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.story import STORY
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Situation
@@ -61,8 +62,8 @@ class MomentTable:
     ``features`` (n, features) are those of the decisions 0, 0.5 s, …  ``meetings`` (m, 3) are for
     begins at every :data:`STRIDE`-th of them the times of the contact with the NPC, of its first
     sight before and of the touchdown, NaN where there is none, and ``never`` (3,) those of an NPC
-    that never begins.  ``phases_s`` are the times of the phases of the landing without it;
-    ``flown`` is how many moments were flown.
+    that never begins.  ``descent_s`` are when the moments of the descent came without it; ``flown``
+    is how many moments were flown.
     """
 
     seed: int
@@ -72,7 +73,7 @@ class MomentTable:
     features: NDArray[np.float64]
     meetings: NDArray[np.float64]
     never: NDArray[np.float64]
-    phases_s: tuple[float, ...]
+    descent_s: tuple[float, ...]
     flown: int
 
     @property
@@ -95,7 +96,7 @@ def table_of(seed: int, landing: GradedLanding) -> MomentTable:
             watch.append(Watch(situation))
         rows.append(watch[0].look(situation))
 
-    waiting, phases_s = _fly(landing.with_begin_at(NEVER_S), note)
+    waiting, descent_s = _fly(landing.with_begin_at(NEVER_S), note)
     stopped = [each.time_s for each in waiting.events if each.name == "motors_stopped"]
     free = landing.uav == "straight" or not _is_near(waiting)
     meetings, flown = [], 0
@@ -114,7 +115,7 @@ def table_of(seed: int, landing: GradedLanding) -> MomentTable:
                 met_s = found.contact_s
                 if met_s is not None and stopped and met_s > stopped[0]:
                     met_s = None
-                meetings.append((met_s, found.seen_s, phases_s[-1]))
+                meetings.append((met_s, found.seen_s, descent_s[-1]))
             else:
                 meetings.append(_flown(landing, moment_s - EARLY_S))
                 flown += 1
@@ -125,8 +126,8 @@ def table_of(seed: int, landing: GradedLanding) -> MomentTable:
         uav=landing.uav,
         features=np.array(rows).reshape(-1, len(FEATURES)),
         meetings=np.array(meetings, dtype=np.float64).reshape(-1, 3),
-        never=np.array(_meeting(waiting, phases_s, landing), dtype=np.float64),
-        phases_s=phases_s,
+        never=np.array(_meeting(waiting, descent_s, landing), dtype=np.float64),
+        descent_s=descent_s,
         flown=flown,
     )
 
@@ -142,7 +143,7 @@ def drawn_table(surrogate: Surrogate, seed: int, folder: Path) -> MomentTable:
                 features=kept["features"],
                 meetings=kept["meetings"],
                 never=kept["never"],
-                phases_s=tuple(kept["phases_s"].tolist()),
+                descent_s=tuple(kept["descent_s"].tolist()),
                 flown=int(kept["flown"]),
                 **text,
             )
@@ -171,13 +172,13 @@ def _flown(landing: GradedLanding, moment_s: float) -> Meeting:
     return _meeting(*_fly(landing.with_begin_at(moment_s)), landing)
 
 
-def _meeting(flight: Flight, phases_s: tuple[float, ...], landing: GradedLanding) -> Meeting:
+def _meeting(flight: Flight, descent_s: tuple[float, ...], landing: GradedLanding) -> Meeting:
     if flight.outcome != "collision" or flight.contacts[-1].body != landing.npc:
-        return None, None, phases_s[-1]
+        return None, None, descent_s[-1]
     contact_s, item = flight.contacts[-1].time_s, flight.objects[0]
     camera = landing.airframe.camera
     shown = in_picture(flight.uav, item.track.position_m, OBJECT_TYPES[item.type], camera)
-    return contact_s, first_seen_s(flight.uav, shown, contact_s - WITHIN_S), phases_s[-1]
+    return contact_s, first_seen_s(flight.uav, shown, contact_s - WITHIN_S), descent_s[-1]
 
 
 def _fly(
@@ -199,7 +200,7 @@ def _fly(
                 break
             episode.step([part.move(situation)])
             situation = episode.situations[0]
-        return episode.record, situation.phases_s
+        return episode.record, situation.moments_s[: len(DESCENT)]
     finally:
         episode.close()
 

@@ -20,6 +20,7 @@ from pytest_garl.reports.film.timeline import Timeline
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.environment import environment_at
+from pytest_garl.simulation.landing_moments import RecordedMoments
 
 CLOSING_S = 2.0
 """How long the last picture, with the outcome, is shown."""
@@ -60,7 +61,7 @@ def frames(
     """
     scenario = placed.scenario
     check_scenario(flight, placed)
-    renderer = renderer_of(placed, camera)
+    renderer = renderer_of(placed, camera, RecordedMoments(flight))
     left, right = CameraPane(renderer), MapPane(flight, placed, camera)
     below = Timeline(flight, signature)
     shown = scenario

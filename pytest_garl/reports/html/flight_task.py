@@ -36,6 +36,7 @@ from pytest_garl.reports.html.turnable_path import scene_data
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.cover_event import renderer_of
+from pytest_garl.simulation.landing_moments import RecordedMoments
 from pytest_garl.verdicts.evidence import Evidence
 
 
@@ -221,7 +222,7 @@ def _drawn(
     try:
         # Without a camera the ground can still be painted.
         camera = dataclass_from(Camera, dict(task.camera), "camera") if task.camera else Camera()
-        renderer = renderer_of(placed, camera)
+        renderer = renderer_of(placed, camera, RecordedMoments(evidence.flight))
         scene = scene_data(placed.map, renderer)
         if task.camera is None:
             note = "The ledger does not name the camera: no pictures."

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.flight.detectability import readable_probability
 from pytest_garl.flight.flight import Flight, ObjectRecord, Step, Track
 from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, feet_height_m
 from pytest_garl.messages import shortened
 from pytest_garl.reports.html.moments import Moment, telling_moment
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.verdicts.detectability import readable_probability
 from pytest_garl.verdicts.evidence import Evidence, Report
 
 MOST_SAMPLES = 900

@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from pytest_garl.flight.detectability import readable_probability
 from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.landing_system import Camera
 from pytest_garl.reports.film import frames, rate_hz, write
@@ -24,7 +25,6 @@ from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.environment import environment_at
-from pytest_garl.verdicts.detectability import readable_probability
 from pytest_garl.verdicts.evidence import Evidence
 
 STILL_PX = (400, 300)

@@ -27,6 +27,7 @@ from pytest_garl.simulation.camera.projection import NEAR_M, Quaternion, Vector,
 from pytest_garl.simulation.camera.true_camera import Mounting, product, true_camera
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.events import Event
+from pytest_garl.simulation.landing_moments import RecordedMoments
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
 from pytest_garl.simulation.timing import Timing
 
@@ -58,7 +59,7 @@ class ShownPictures:
         scenario = place.placed.scenario
         self.camera = true_camera(declared, scenario)
         self._mounting = Mounting(scenario)
-        self.times_s = taken_s(flight.steps, scenario, declared)
+        self.times_s = taken_s(flight, scenario, declared)
 
     @property
     def turn(self) -> Quaternion:
@@ -68,8 +69,9 @@ class ShownPictures:
     def __iter__(self) -> Iterator[ShownPicture]:
         """Draw the pictures one after the other, in the order of time."""
         flight, scenario = self._flight, self._placed.scenario
-        renderer = renderer_of(self._placed, self.camera)
-        outage, freezes = Event(scenario, "outage"), scenario["outage.frozen"] > 0
+        moments = RecordedMoments(flight)
+        renderer = renderer_of(self._placed, self.camera, moments)
+        outage, freezes = Event(scenario, "outage", moments), scenario["outage.frozen"] > 0
         last = black = np.zeros((self.camera.height_px, self.camera.width_px, 3), np.uint8)
         present = scenario
         for time_s, step in zip(self.times_s, flight.steps, strict=True):
@@ -108,16 +110,17 @@ class ShownPictures:
         return float(u), float(v)
 
 
-def taken_s(steps: tuple[Step, ...], scenario: Scenario, camera: Camera) -> tuple[float, ...]:
+def taken_s(flight: Flight, scenario: Scenario, camera: Camera) -> tuple[float, ...]:
     """Return when the picture of each step was taken.
 
     These are the times of the steps if they do not fit the delays of the scenario.
     """
-    under_way, times, over = _Deliveries(scenario, camera), [], False
-    for step in steps:
+    moments = RecordedMoments(flight)
+    under_way, times, over = _Deliveries(scenario, camera, moments), [], False
+    for step in flight.steps:
         taken = step.time_s if over else under_way.taken_s(step.time_s)
         if taken is None:
-            return tuple(each.time_s for each in steps)
+            return tuple(each.time_s for each in flight.steps)
         times.append(taken)
         # After it the simulator goes on looking, and hands over no pictures.
         over = over or step.command == "Abort"
@@ -127,8 +130,8 @@ def taken_s(steps: tuple[Step, ...], scenario: Scenario, camera: Camera) -> tupl
 class _Deliveries:
     """The pictures of a flight in the order in which they arrive (``simulation/sensors.py``)."""
 
-    def __init__(self, scenario: Scenario, camera: Camera) -> None:
-        self._timing = Timing(scenario)
+    def __init__(self, scenario: Scenario, camera: Camera, moments: RecordedMoments) -> None:
+        self._timing = Timing(scenario, moments)
         self._ticks_per_frame = max(1, round(PHYSICS_RATE_HZ / camera.rate_hz))
         self._tick = 0
         self._waiting: deque[tuple[int, int]] = deque()

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pytest_garl.flight.detectability import readable_probability
 from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, HARD_TOUCHDOWN_MPS, UPRIGHT_RAD
 from pytest_garl.reports.html.flight_view import gap_m
 from pytest_garl.reports.mcap.numbers import Numbers
 from pytest_garl.reports.mcap.values import Logged, ns
-from pytest_garl.verdicts.detectability import readable_probability
 from pytest_garl.verdicts.evidence import target_of
 from pytest_garl.verdicts.verdict import Limits
 

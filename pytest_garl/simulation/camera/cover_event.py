@@ -14,15 +14,19 @@ from pytest_garl.simulation.camera.exposure import STILL, Movement
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Quaternion, Renderer, Vector
 from pytest_garl.simulation.camera.solids import BodyPose
-from pytest_garl.simulation.events import Event
+from pytest_garl.simulation.events import Event, Moments
 from pytest_garl.simulation.randomness import generator
 
 
-def renderer_of(placed: Placed, camera: Camera, *, colour: bool = True) -> Renderer:
+def renderer_of(
+    placed: Placed, camera: Camera, moments: Moments, *, colour: bool = True
+) -> Renderer:
     """Return the renderer of a flight's frames, with what covers the marker for a while."""
     scenario = placed.scenario
-    made = Renderer if not _is_covered(scenario) else _Covering
-    return made(placed, camera, generator(scenario.seed, "sensor"), colour=colour)
+    rng = generator(scenario.seed, "sensor")
+    if not _is_covered(scenario):
+        return Renderer(placed, camera, rng, colour=colour)
+    return _Covering(placed, camera, rng, moments, colour=colour)
 
 
 def _is_covered(scenario: Scenario) -> bool:
@@ -37,12 +41,13 @@ class _Covering(Renderer):
         placed: Placed,
         camera: Camera,
         rng: np.random.Generator,
+        moments: Moments,
         *,
         colour: bool = True,
     ) -> None:
         super().__init__(placed, camera, rng, colour=colour)
         scenario = placed.scenario
-        self._event = Event(scenario, "cover")
+        self._event = Event(scenario, "cover", moments)
         share = scenario["cover.share_percent"] / 100
         self._with_cover = self.with_pad(dataclasses.replace(placed.pad, covered_share=share))
 

@@ -42,10 +42,10 @@ class BirdPath:
         self.entry_m = _beyond(self._crossing_m, away_rad, away_m)
         self.far_away_m = _beyond(self._crossing_m, away_rad, FAR_AWAY_M)
 
-    def comes(self, time_s: float, phases_s: tuple[float, ...]) -> bool:
+    def comes(self, time_s: float, moments_s: tuple[float, ...]) -> bool:
         """Take in the time; return whether the bird comes at this moment."""
         self._now_s = time_s
-        if not self.waits or self._story is None or time_s < self._story.begins_s(phases_s):
+        if not self.waits or self._story is None or time_s < self._story.begins_s(moments_s):
             return False
         self.waits, self._began_s = False, time_s
         return True

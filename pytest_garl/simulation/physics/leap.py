@@ -50,7 +50,7 @@ class Leap:
     def update(
         self,
         time_s: float,
-        phases_s: tuple[float, ...],
+        moments_s: tuple[float, ...],
         place_m: tuple[float, float],
         uav_m: Vector,
     ) -> None:
@@ -65,7 +65,7 @@ class Leap:
             if time_s - self._began_s >= 2 * self._lift_mps / GRAVITY_MPS2:
                 self._began_s = None
             return
-        begins_s = self._story.begins_s(phases_s)
+        begins_s = self._story.begins_s(moments_s)
         is_its_time = begins_s <= time_s <= begins_s + APPROACH_S + self._story.lasts_s
         seen_s, seen_m = self._seen[0]
         if is_its_time and seen_s <= time_s - REACTION_S and self._reaches(place_m, seen_m):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.scenarios.bodies import Body, Disc, discs_of
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.npc_policy import (
@@ -27,6 +28,12 @@ from pytest_garl.simulation.physics.locomotion import (
 )
 from pytest_garl.simulation.physics.solids_ahead import course_around, free_velocity, gap_m
 
+Vector = tuple[float, float, float]
+SINKS_MPS = 0.2
+"""A UAV that sinks faster comes down: engineering estimate, below the slowest descent of landing
+systems, 0.3 m/s."""
+NEAR_MARKER_M = 3.0
+"""A UAV that sinks within this distance of the marker comes down on it: engineering estimate."""
 _LOOK_AHEAD_M = 0.5
 _CONTACT_RANGE_M = 2.0
 """No two objects farther apart can touch in the next 1/60 s: more than the sum of two radii and of
@@ -50,6 +57,9 @@ class Npc:
             least = self.type.least_speed_mps
             self.vx_mps = least * math.cos(self.yaw_rad)
             self.vy_mps = least * math.sin(self.yaw_rad)
+        self._marker_m = placed.marker_m
+        self.met_s = math.inf
+        """When it could just meet the UAV; infinite if it could not yet."""
         self._reserve_m = self.type.burst_m
         self._leap = Leap(own)
         self.bird_path = BirdPath(own, placed.marker_m) if self.flies else None
@@ -127,19 +137,36 @@ class Npc:
         ]
 
     def update(
-        self, time_s: float, phases_s: tuple[float, ...], uav_m: tuple[float, float, float]
+        self, time_s: float, landing_s: tuple[float, ...], uav_m: Vector, uav_mps: Vector
     ) -> None:
-        """Take in the time, when the phases of the landing began, and where the UAV is.
+        """Take in the time, when the moments of the landing came, and how the UAV moves.
 
         A bird may come now, and a dog leap.
         """
-        self._leap.update(time_s, phases_s, (self.x_m, self.y_m), uav_m)
+        if math.isinf(self.met_s) and self._can_just_meet(uav_m, uav_mps):
+            self.met_s = time_s
+        moments_s = (*landing_s, self.met_s)
+        self._leap.update(time_s, moments_s, (self.x_m, self.y_m), uav_m)
         path = self.bird_path
-        if path is not None and path.comes(time_s, phases_s):
+        if path is not None and path.comes(time_s, moments_s):
             (self.x_m, self.y_m), self.yaw_rad = path.entry_m, path.course_rad
             self.vx_mps = self.speed_mps * math.cos(self.yaw_rad)
             self.vy_mps = self.speed_mps * math.sin(self.yaw_rad)
             self._wanted_velocity_mps = (self.vx_mps, self.vy_mps)
+
+    def _can_just_meet(self, uav_m: Vector, uav_mps: Vector) -> bool:
+        """Whether the UAV is down at the NPC's height as soon as the NPC can be below it.
+
+        Both move straight on: the UAV sinks near the marker, the NPC goes at its highest speed.
+        """
+        sinks_mps = -uav_mps[2]
+        if sinks_mps < SINKS_MPS or math.dist(uav_m[:2], self._marker_m) > NEAR_MARKER_M:
+            return False
+        path = self.bird_path
+        place = path.entry_m if path is not None and path.waits else (self.x_m, self.y_m)
+        top_m = (path.lowest_m if path is not None else 0.0) + self.type.low_m + self.type.height_m
+        left_s = (feet_height_m(uav_m[2]) - top_m) / sinks_mps
+        return left_s * self.speed_mps <= math.dist(place, uav_m[:2])
 
     def advance(self, dt_s: float, others: Sequence[Npc] = ()) -> None:
         """Turn and accelerate towards the wanted velocity; slide along solids and ``others``."""

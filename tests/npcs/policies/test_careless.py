@@ -30,7 +30,7 @@ def test_it_does_not_come_before_its_phase() -> None:
     scenario = scenario_with("person-1", (-8.0, 0.0), 1.4, {**CARELESS, "phase": 2.0})
     waiting = walk(scenario, "person-1", seconds=20)
     assert np.ptp(waiting[:, 0]) == 0
-    coming = walk(scenario, "person-1", seconds=20, phases=(0.0, 5.0, 8.0, NEVER))
+    coming = walk(scenario, "person-1", seconds=20, moments=(0.0, 5.0, 8.0, NEVER))
     moved = np.flatnonzero(np.diff(coming[:, 0]) != 0)
     assert 7.9 < moved[0] * TICK_S < 8.6
 

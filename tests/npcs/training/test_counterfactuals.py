@@ -43,7 +43,7 @@ def made(*meetings: tuple[float, float, float], decisions: int = 6) -> MomentTab
         features=np.zeros((decisions, len(FEATURES))),
         meetings=np.array(meetings),
         never=np.array([NAN, NAN, 9.0]),
-        phases_s=(0.0, 1.0, 2.0, 9.0),
+        descent_s=(0.0, 1.0, 2.0, 9.0),
         flown=0,
     )
 

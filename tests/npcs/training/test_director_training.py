@@ -50,7 +50,7 @@ def table(seed: int, decisions: int = 12) -> MomentTable:
         features=rows,
         meetings=np.array(meetings),
         never=np.array([NAN, NAN, 9.0]),
-        phases_s=(0.0, 1.0, 2.0, 9.0),
+        descent_s=(0.0, 1.0, 2.0, 9.0),
         flown=0,
     )
 

@@ -79,7 +79,7 @@ def test_pictures_are_those_that_the_system_was_shown(genes: dict[str, float]) -
 
 def test_late_pictures_were_taken_earlier() -> None:
     flight, scenario, _ = flown(**LATE)
-    times = taken_s(flight.steps, scenario, Watches.airframe.camera)
+    times = taken_s(flight, scenario, Watches.airframe.camera)
     late = [step.time_s - taken for step, taken in zip(flight.steps, times, strict=True)]
     given_up = next(i for i, step in enumerate(flight.steps) if step.command == "Abort")
     assert all(0.15 <= each < 0.27 for each in late[: given_up + 1])
@@ -90,7 +90,7 @@ def test_late_pictures_were_taken_earlier() -> None:
 
 def test_pictures_of_another_scenario_keep_the_times_of_their_steps() -> None:
     flight, _, _ = flown()
-    times = taken_s(flight.steps, SCENARIO.replace(LATE), Watches.airframe.camera)
+    times = taken_s(flight, SCENARIO.replace(LATE), Watches.airframe.camera)
     assert times == tuple(step.time_s for step in flight.steps)
 
 

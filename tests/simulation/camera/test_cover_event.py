@@ -11,6 +11,7 @@ from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Renderer
+from pytest_garl.simulation.landing_moments import LandingMoments
 from pytest_garl.simulation.randomness import generator
 from tests.support.flights import EMPTY, nominal
 
@@ -19,9 +20,8 @@ LEVEL = (0.0, 0.0, 0.0, 1.0)
 
 def frame(share: float, time_s: float = 12.0, *, colour: bool = True, yaw: float = 0.0) -> Frame:
     event = {"cover__from_s": 10.0, "cover__lasts_s": 5.0, "cover__share_percent": share}
-    renderer = renderer_of(
-        Placed(nominal(**event, pad__yaw_deg=yaw), EMPTY), Camera(), colour=colour
-    )
+    placed = Placed(nominal(**event, pad__yaw_deg=yaw), EMPTY)
+    renderer = renderer_of(placed, Camera(), LandingMoments(), colour=colour)
     x, y = renderer.marker_m
     return renderer.render((x, y, 4.0), LEVEL, time_s, [])
 

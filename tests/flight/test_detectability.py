@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_garl.flight.flight import MarkerView
-from pytest_garl.verdicts.detectability import (
+from pytest_garl.flight.detectability import (
     FEATURES,
     READABLE,
     Network,
     features,
     readable_probability,
 )
+from pytest_garl.flight.flight import MarkerView
 from tests.verdicts.flights import CLEAR, FOGGY
 
 

@@ -1,0 +1,94 @@
+"""The moments of a landing that stories of NPCs and events wait for, as they come in a flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from pytest_garl.flight.detectability import READABLE, readable_probability
+from pytest_garl.flight.flight import Flight, MarkerView
+from pytest_garl.flight.thresholds import feet_height_m
+from pytest_garl.scenarios.groups import MOMENTS
+from pytest_garl.scenarios.story import MET
+
+HEIGHTS_M = (8.0, 3.0, 0.1)
+"""Heights of the feet above the ground that begin the moments after the start."""
+DESCENT_HYSTERESIS_M = 0.5
+"""A UAV sinks past a height if it was higher by this: it takes off from below."""
+LOST_AFTER_S = 0.5
+"""A marker is lost if no picture for half a second could be read: one bad picture is no loss."""
+OF_PICTURES = ("readable", "lost")
+"""The moments that pictures tell, and no height."""
+_READABLE_AT, _LOST_AT = (MOMENTS.index(name) for name in OF_PICTURES)
+
+
+class LandingMoments:
+    """Notes when each of ``MOMENTS`` came for the first time; infinite if it has not.
+
+    A UAV that was never above a height has sunk past it when it sinks past the next one.  A picture
+    counts when the landing system gets it; who flies a record again without pictures gives the
+    moments of that record.
+    """
+
+    def __init__(self, recorded: Iterable[tuple[str, float]] = ()) -> None:
+        self._peak_m = 0.0
+        self._last_readable_s = math.inf
+        self._began_s = [0.0, *(math.inf for _ in MOMENTS[1:])]
+        self._recorded = [(name, time_s) for name, time_s in recorded if name in OF_PICTURES]
+
+    @property
+    def began_s(self) -> tuple[float, ...]:
+        """When each moment came."""
+        return tuple(self._began_s)
+
+    def update(self, time_s: float, height_m: float) -> None:
+        """Take in the height of the feet above the ground."""
+        self._peak_m = max(self._peak_m, height_m)
+        for number, limit_m in enumerate(HEIGHTS_M, start=1):
+            if height_m <= limit_m <= self._peak_m - DESCENT_HYSTERESIS_M:
+                for each in range(1, number + 1):
+                    self._began_s[each] = min(self._began_s[each], time_s)
+        for name, came_s in self._recorded:
+            if came_s <= time_s:
+                self._began_s[MOMENTS.index(name)] = came_s
+
+    def see(self, time_s: float, view: MarkerView | None) -> None:
+        """Take in what a picture shows of the marker."""
+        if math.isfinite(self._began_s[_LOST_AT]):
+            return
+        if readable_probability(view) >= READABLE:
+            self._last_readable_s = time_s
+            self._began_s[_READABLE_AT] = min(self._began_s[_READABLE_AT], time_s)
+        elif time_s - self._last_readable_s >= LOST_AFTER_S:
+            self._began_s[_LOST_AT] = time_s
+
+    @property
+    def record(self) -> tuple[tuple[str, float], ...]:
+        """The moments that came, for the record of the flight."""
+        pairs = zip(MOMENTS, self._began_s, strict=True)
+        return tuple((name, time_s) for name, time_s in pairs if math.isfinite(time_s))
+
+
+class RecordedMoments:
+    """The moments of a recorded flight."""
+
+    def __init__(self, flight: Flight) -> None:
+        self._came = came = dict(flight.moments or _of_track(flight).record)
+        self.began_s = tuple(came.get(name, math.inf) for name in MOMENTS)
+
+    def of_npc(self, name: str) -> tuple[float, ...]:
+        """Return when each moment came for which the story of an NPC may wait."""
+        return (*self.began_s, self._came.get(met_by(name), math.inf))
+
+
+def met_by(name: str) -> str:
+    """Return the name in a record of the moment at which an NPC could just meet the UAV."""
+    return f"{MET} {name}"
+
+
+def _of_track(flight: Flight) -> LandingMoments:
+    """Return the moments of a simulator that records none, from the heights of its track."""
+    moments = LandingMoments()
+    for time_s, height_m in zip(flight.uav.time_s, flight.uav.position_m[:, 2], strict=True):
+        moments.update(float(time_s), feet_height_m(float(height_m)))
+    return moments
