@@ -82,9 +82,10 @@ def nominal_views(flight: Flight, placed: Placed, camera: Camera) -> tuple[Nomin
 
     The objects are where they were at that time of the flight, or at its end if it had ended; the
     environment is that to which NPC policies had changed it.  The UAV's own path plays no part, but
-    that an event came when it did.  A camera that fails shows nothing.  Later attempts are those whose descent ends before the
-    system gave up, or before the time was up.  The camera is the true one, turned and dirty as the
-    scenario says; it hovers while it looks, so that a long exposure does not blur.
+    that an event came when it did.  A camera that fails shows nothing.  Later attempts are those
+    whose descent ends before the system gave up, or before the time was up.  The camera is the true
+    one, turned and dirty as the scenario says; it hovers while it looks, so that a long exposure
+    does not blur.
     """
     scenario, moments = placed.scenario, RecordedMoments(flight)
     renderer = renderer_of(placed, true_camera(camera, scenario), moments, colour=False)
