@@ -85,7 +85,7 @@ class Descends(Scripted):
     needs_camera = True
 
     def reset(self, mission: Mission) -> None:
-        self.home = mission.gps_position_m
+        self.home = (*mission.gps_position_m, 0.0)
 
     def step(self, observation: Observation) -> Command:
         return self.hover(9.5 if observation.time_s < 10 else max(0.5, 19.5 - observation.time_s))
