@@ -58,20 +58,23 @@ class _Solid:
     shadow_reach_m: float = 0.0
     """How far the shadow reaches from below the body's position."""
 
-    def move_to(self, pose: BodyPose, conditions: Conditions) -> None:
+    def move_to(self, pose: BodyPose) -> bool:
+        """Move to a pose; return whether the solid has turned."""
         position_m, yaw = pose
         self.position_m = position_m
         if yaw == self.yaw_rad:
-            return
+            return False
         self.yaw_rad, self.rotation = yaw, yaw_matrix(yaw)
         self.shaded_colours = {}
-        if sun_shines(conditions):
-            hulls = placed_hulls(self.meshes[0], (0.0, 0.0, 0.0), yaw)
-            flat = (shadow_of(hull, conditions.sun) for hull in hulls)
-            outlines = [cv2.convexHull(s).reshape(-1, 2) for s in flat]
-            self.shadow_outlines = np.concatenate(outlines).astype(np.float64)
-            self.corner_counts = [len(outline) for outline in outlines]
-            self.shadow_reach_m = float(np.hypot(*self.shadow_outlines.T).max())
+        return True
+
+    def cast_shadow(self, sun: tuple[float, float, float]) -> None:
+        hulls = placed_hulls(self.meshes[0], (0.0, 0.0, 0.0), self.yaw_rad)
+        flat = (shadow_of(hull, sun) for hull in hulls)
+        outlines = [cv2.convexHull(s).reshape(-1, 2) for s in flat]
+        self.shadow_outlines = np.concatenate(outlines).astype(np.float64)
+        self.corner_counts = [len(outline) for outline in outlines]
+        self.shadow_reach_m = float(np.hypot(*self.shadow_outlines.T).max())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,8 +121,13 @@ class Solids:
             for body in map.bodies
         ]
         for solid, body in zip(self._static, map.bodies, strict=True):
-            solid.move_to((body.position_m, body.yaw_rad), conditions)
-        self._boxes_m = np.array([_box(solid) for solid in self._static]).reshape(-1, 8, 3)
+            # Its shadow is painted on the ground once per flight.
+            solid.move_to((body.position_m, body.yaw_rad))
+        boxes = [
+            _box(body.parts) @ solid.rotation.T.astype(np.float64) + solid.position_m
+            for solid, body in zip(self._static, map.bodies, strict=True)
+        ]
+        self._boxes_m = np.array(boxes).reshape(-1, 8, 3)
         self._moving = [
             _Solid(segment=segment_ids[name], meshes=_levels(OBJECT_TYPES[kind].parts))
             for name, kind in map.present_objects
@@ -132,7 +140,8 @@ class Solids:
     def place(self, objects: Sequence[BodyPose]) -> None:
         """Move the dynamic objects, in the map's order, to their present poses."""
         for solid, pose in zip(self._moving, objects, strict=True):
-            solid.move_to(pose, self._conditions)
+            if solid.move_to(pose) and sun_shines(self._conditions):
+                solid.cast_shadow(self._conditions.sun)
 
     def shadows(self) -> tuple[Shadow, ...]:
         """Return the present shadows of the dynamic objects."""
@@ -281,14 +290,15 @@ def sun_shines(conditions: Conditions) -> bool:
     return conditions.direct_share > 0.01 and conditions.sun[2] > 0.02
 
 
-def _box(solid: _Solid) -> NDArray[np.float64]:
-    """Return the corners (8, 3) in the world of a box about a solid."""
-    corners = np.concatenate([mesh.corners.reshape(-1, 3) for mesh in solid.meshes])
+@functools.lru_cache(maxsize=64)
+def _box(parts: tuple[Part, ...]) -> NDArray[np.float64]:
+    """Return the corners (8, 3), in the body's frame, of a box about it."""
+    corners = np.concatenate([mesh.corners.reshape(-1, 3) for mesh in _levels(parts)])
     sides = np.stack([corners.min(axis=0), corners.max(axis=0)]).astype(np.float64)
     picks = np.array(list(itertools.product((0, 1), repeat=3)))
-    own = sides[picks, np.arange(3)]
-    placed: NDArray[np.float64] = own @ solid.rotation.T.astype(np.float64) + solid.position_m
-    return placed
+    box: NDArray[np.float64] = sides[picks, np.arange(3)]
+    box.setflags(write=False)
+    return box
 
 
 def _levels(parts: tuple[Part, ...]) -> tuple[Mesh, ...]:
