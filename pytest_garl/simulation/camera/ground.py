@@ -51,19 +51,6 @@ class Raster:
         x, y = self.x_min + columns * self.m_per_px, self.y_max - rows * self.m_per_px
         return np.array([[self.x_min, self.y_max], [x, self.y_max], [x, y], [self.x_min, y]])
 
-    def holds(self, points: NDArray[np.float64]) -> bool:
-        """Whether homogeneous world points (3, n) of equal sign all lie well inside."""
-        places = points[:2] / points[2]
-        low, high = self._inner
-        return bool(((places >= low) & (places <= high)).all())
-
-    @functools.cached_property
-    def _inner(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The lowest and the highest places (2, 1) that lie well inside."""
-        slack = 4 * self.m_per_px * 2 ** len(self.levels)
-        low, high = self.outline.min(axis=0) + slack, self.outline.max(axis=0) - slack
-        return low[:, None], high[:, None]
-
     def pixel_of_world(self, level: int) -> NDArray[np.float64]:
         """Matrix (3, 3) from homogeneous world (x, y) to pixel centres of a level."""
         scale = 1 / (self.m_per_px * 2**level)

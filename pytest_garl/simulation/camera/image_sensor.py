@@ -56,5 +56,5 @@ class Sensor:
         down, across = digest[0] % _SPARE, digest[1] % _SPARE
         height, width = image.shape[:2]
         here = np.s_[down : down + height, across : across + width]
-        result = cv2.subtract(cv2.add(image, self._more[here]), self._less[here])
-        return np.asarray(result, dtype=np.uint8)
+        cv2.add(image, self._more[here], image)
+        return np.asarray(cv2.subtract(image, self._less[here], image), dtype=np.uint8)

@@ -321,11 +321,9 @@ def _ground_image(scene: _Scene) -> NDArray[np.uint8]:
     height, width = scene.depth_m.shape
     # Four channels: warpPerspective is 2.5 times as fast as with three.
     image = np.empty((height, width, 4), np.uint8)
-    right, bottom = width - 1.0, height - 1.0
-    corners = np.array([[0, 0, 1], [right, 0, 1], [right, bottom, 1], [0, bottom, 1]]).T
     inset = ground.inset
     rows, columns = slice(0, height), slice(0, width)
-    if scene.sky is not None or not inset.holds(world @ corners):
+    if scene.sky is not None or not _stays_within(image, *_scaled(inset, world, footprint)):
         _warp(ground.wide, image, world, footprint, cv2.BORDER_REFLECT_101)
         rows, columns = view.box(view.ground_polygon(inset.outline))
     part = image[rows, columns]
@@ -358,10 +356,8 @@ def _warp(
     footprint_m: float,
     border: int,
 ) -> None:
-    wanted = math.log2(max(footprint_m / raster.m_per_px, 1e-6))
-    level = min(len(raster.levels) - 1, max(0, round(wanted)))
-    source, pixel_of_pixel = raster.levels[level], raster.pixel_of_world(level) @ world
-    if border == cv2.BORDER_REFLECT_101 and _stays_within(source, image, pixel_of_pixel):
+    source, pixel_of_pixel = _scaled(raster, world, footprint_m)
+    if border == cv2.BORDER_REFLECT_101 and _stays_within(image, source, pixel_of_pixel):
         # The same bytes in two thirds of the time: nothing is reflected.
         border = cv2.BORDER_CONSTANT
     cv2.warpPerspective(
@@ -374,8 +370,17 @@ def _warp(
     )
 
 
+def _scaled(
+    raster: Raster, world: NDArray[np.float64], footprint_m: float
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Return the level of a raster that has pixels of that size, and the map to its pixels."""
+    wanted = math.log2(max(footprint_m / raster.m_per_px, 1e-6))
+    level = min(len(raster.levels) - 1, max(0, round(wanted)))
+    return raster.levels[level], raster.pixel_of_world(level) @ world
+
+
 def _stays_within(
-    source: NDArray[np.uint8], image: NDArray[np.uint8], pixel_of_pixel: NDArray[np.float64]
+    image: NDArray[np.uint8], source: NDArray[np.uint8], pixel_of_pixel: NDArray[np.float64]
 ) -> bool:
     """Whether a map from the pixels of an image leads to pixels well inside another one only."""
     (height, width), (rows, columns) = image.shape[:2], source.shape[:2]

@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from typing import Any
 
 import cv2
 import numpy as np
@@ -19,7 +20,9 @@ from pytest_garl.scenarios.maps.loading import map_names
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import repair
+from pytest_garl.simulation.camera import renderer as renderer_module
 from pytest_garl.simulation.camera.frame import Frame
+from pytest_garl.simulation.camera.ground import Raster
 from pytest_garl.simulation.camera.renderer import Renderer
 from tests.support.pictures import CAMERA, LEVEL, poses, renderer
 
@@ -129,3 +132,19 @@ def test_the_border_that_is_not_reached_does_not_change_the_ground(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("pytest_garl.simulation.camera.renderer._stays_within", lambda *_: False)
         assert (fast == image()).all()
+
+
+def test_ground_that_the_fine_piece_hides_is_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[float] = []
+
+    def noted(raster: Raster, *rest: Any) -> None:
+        drawn.append(raster.m_per_px)
+        warp(raster, *rest)
+
+    warp = renderer_module._warp
+    monkeypatch.setattr(renderer_module, "_warp", noted)
+    fast = picture(height=0.8).image
+    assert len(drawn) == 1
+    monkeypatch.setattr(renderer_module, "_stays_within", lambda *rest: False)
+    assert (picture(height=0.8).image == fast).all()
+    assert len(drawn) == 3
