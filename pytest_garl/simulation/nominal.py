@@ -16,9 +16,9 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from pytest_garl.flight.flight import Flight, NominalView, ObjectRecord
+from pytest_garl.flight.flight import Flight, MarkerView, NominalView, ObjectRecord
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
@@ -91,17 +91,22 @@ def nominal_views(flight: Flight, placed: Placed, camera: Camera) -> tuple[Nomin
     renderer = renderer_of(placed, true_camera(camera, scenario), moments, colour=False)
     attitude = Mounting(scenario).attitude(LEVEL)
     shown, views, outage = scenario, [], Event(scenario, "outage", moments)
+    cover = Event(scenario, "cover", moments)
+    # A look shows what an earlier one showed from the same place, unless something has changed.
+    known: dict[tuple[Any, ...], MarkerView | None] = {}
     for look in _looks(placed, _waits_until_s(flight, scenario)):
         present = environment_at(scenario, flight, look.time_s)
         if present != shown:
             renderer.change(present)
-            shown = present
+            shown, known = present, {}
         if outage.happens(look.time_s):
             continue
         eye = eye_under((*look.place_m, look.height_m), LEVEL)
-        poses = [_pose(item, look.time_s) for item in flight.objects]
-        frame = renderer.render(eye, attitude, look.time_s, poses)
-        if (marker := frame.marker) is None:
+        poses = tuple(_pose(item, look.time_s) for item in flight.objects)
+        sight = eye, poses, cover.happens(look.time_s)
+        if sight not in known:
+            known[sight] = renderer.render(eye, attitude, look.time_s, poses).marker
+        if (marker := known[sight]) is None:
             continue
         views.append(
             NominalView(

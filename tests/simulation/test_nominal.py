@@ -16,6 +16,8 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placed import Placed
+from pytest_garl.simulation.camera.frame import Frame
+from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.nominal import (
     SIGHT_HEIGHTS_M,
@@ -194,3 +196,21 @@ def test_objects_stay_where_a_flight_that_ended_early_left_them() -> None:
     flight = fly(nominal(), AbortsAtOnce, STAND, map=EMPTY, time_limit_s=20)
     assert flight.elapsed_s < min(view.time_s for view in above(flight))
     assert math.isfinite(Evidence(flight).expected_readable_s)
+
+
+def test_a_place_from_which_nothing_has_changed_is_drawn_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scenario, drawn = nominal(**COVER), []
+    flight = fly(scenario, Hovers, STAND, map=EMPTY, time_limit_s=100)
+
+    def noted(self: Renderer, *rest: Any) -> Frame:
+        drawn.append(rest)
+        return render(self, *rest)
+
+    render = Renderer.render
+    monkeypatch.setattr(Renderer, "render", noted)
+    views = nominal_views(flight, Placed(scenario, EMPTY), Camera())
+    assert views == flight.nominal_views
+    places = {(view.place, view.height_m, view.marker) for view in views}
+    assert len(places) <= len(drawn) < len(views) / 2
