@@ -63,7 +63,7 @@ def test_a_machine_without_avx2_is_left_as_it_is(
     flags: frozenset[str], machine: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cpu(monkeypatch, flags, machine)
-    assert cpu_dispatch.environment() == cpu_dispatch.THREADS
+    assert cpu_dispatch.environment().keys() == {*cpu_dispatch.THREADS, "GLIBC_TUNABLES"}
     assert cpu_dispatch.expected() != cpu_dispatch.BASELINE
     assert not cpu_dispatch.libraries_off_baseline()
     cpu_dispatch.check()
@@ -149,3 +149,8 @@ def test_training_computes_by_the_baseline() -> None:
         check=True,
     )
     assert done.stdout.split() == ["AVX2", cpu_dispatch.BASELINE]
+
+
+def test_tunables_of_the_user_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GLIBC_TUNABLES", "glibc.malloc.check=3")
+    assert cpu_dispatch.environment()["GLIBC_TUNABLES"] == "glibc.malloc.check=3"

@@ -28,6 +28,8 @@ COMMANDS = {
     "train": "train",
 }
 """The subcommands, and the module of each, without ``_command``."""
+_FLIES = "check"
+"""The subcommand that flies in its own process."""
 _RESTARTED = "_PYTEST_GARL_RESTARTED"
 
 
@@ -39,9 +41,11 @@ class Pinned(click.Command):
     """
 
     def main(self, args: Any = None, *rest: Any, **more: Any) -> Any:
-        """Start again if NumPy was loaded too early, then run."""
-        if args is None and not cpu_dispatch.pin() and _RESTARTED not in os.environ:
-            # NumPy was loaded while the interpreter started: start again with this environment.
+        """Start again if that lets flights be right or faster, then run."""
+        # The C library reads its part of the environment when a process starts.
+        is_slow = _FLIES in sys.argv[1:2] and not cpu_dispatch.was_started_for_flights()
+        if args is None and (not cpu_dispatch.pin() or is_slow) and _RESTARTED not in os.environ:
+            # NumPy may have been loaded while the interpreter started.
             os.environ[_RESTARTED] = "1"
             os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
         return super().main(args, *rest, **more)

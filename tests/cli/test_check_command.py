@@ -236,3 +236,15 @@ def test_check_is_not_ended_by_what_it_checks(tmp_path: Path, target: str, words
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert words in done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux tells with what a process was started")
+def test_it_starts_with_the_environment_of_flights(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("GLIBC_TUNABLES", "_PYTEST_GARL_RESTARTED"):
+        monkeypatch.delenv(name, raising=False)
+    Path("tells.py").write_text(
+        "from pathlib import Path\nprint(Path('/proc/self/environ').read_text().split('\\0'))\n"
+    )
+    command = [str(Path(sys.executable).with_name("garl")), "check", "tells:Nothing"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "'GLIBC_TUNABLES=glibc.malloc.hugetlb=1'" in done.stdout
