@@ -133,7 +133,9 @@ def _least_gap(npc: PlacedNpc, way: Way, story: Story) -> tuple[float, float, bo
     """Return the least gap between the UAV and a body, when it was, and whether it was in view."""
     kind, speed, (x, y) = npc.type, npc.speed_mps, npc.start_m
     cx, cy = (a + b for a, b in zip(way.marker_m, story.crossing_m, strict=True))
-    begins = story.begins_s((*way.moments_s, way.met_s(npc)))
+    # In place of the decision of a director: the rule that it has to beat.
+    met_s = way.met_s(npc)
+    begins = story.begins_s((*way.moments_s, met_s, met_s))
     middle = npc.height_m
     stays_until, met_s, crossed = math.inf, math.inf, False
     best = (10.0, 0.0, False)

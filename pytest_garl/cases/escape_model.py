@@ -143,7 +143,7 @@ class EscapeModel:
             marker_position_m=self._chase.flight.marker_position_m,
             map=self._chase.map,
             scenario=scenario,
-            moments_s=(*moments.began_s, own.met_s),
+            moments_s=(*moments.began_s, own.met_s, own.decided_s),
         )
 
     def _warm_npcs(self) -> list[Npc]:

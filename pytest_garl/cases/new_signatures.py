@@ -86,7 +86,7 @@ def request_of(
     ``number`` counts the requests for this signature, each of another cause.
     """
     folder = Path(job.flights)
-    violations = [(parse_scenario(each.scenario), each.completed(folder)) for each in flights]
+    violations = [(each.repeatable, each.completed(folder)) for each in flights]
     return CaseRequest(
         name=named(search, signature, number),
         signature=signature,

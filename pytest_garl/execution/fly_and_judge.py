@@ -86,6 +86,7 @@ def judge_record(
     """
     from pytest_garl.execution.severity_of_flight import severity_of
     from pytest_garl.flight.flight_file import load
+    from pytest_garl.simulation.landing_moments import decided_genes
 
     map = job.load_map()
     if flown.refusal:
@@ -96,7 +97,9 @@ def judge_record(
         record = measured(record)
     result = judged(record, job.limits)
     severity = severity_of(record, result.verdict, scenario, map, job.npcs)
-    return dataclasses.replace(result, severity=severity), record.sha256, record.wall_s
+    decided = decided_genes(scenario, record, decides=job.npcs.decides_begin)
+    result = dataclasses.replace(result, severity=severity, decided=decided)
+    return result, record.sha256, record.wall_s
 
 
 def measured(flight: Flight) -> Flight:

@@ -15,6 +15,8 @@ from typing import Any
 from pytest_garl.execution.database import Database
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot
 from pytest_garl.execution.result import FlightResult, parse_result
+from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.ending import ending_of
 
 _ADDRESS = re.compile(r"0x[0-9a-f]+")
@@ -58,6 +60,11 @@ class LedgerFlight:
     def signature(self) -> str:
         """How it ended, as in the result; empty for a flight without violation."""
         return self.result.signature
+
+    @property
+    def repeatable(self) -> Scenario:
+        """The scenario, with what was decided in the flight as its own: it needs no director."""
+        return parse_scenario(self.scenario).replace(dict(self.result.decided))
 
     def completed(self, folder: Path) -> CompletedFlight:
         """Return the flight with its record, which is in a folder of flights."""

@@ -46,6 +46,7 @@ class FlightResult:
     ``closest_call`` is the signature that a near miss would have had, ``closest_body`` the body
     of that near miss; both are empty without one.  ``landed_s`` is the time of the touchdown of a
     flight that landed.  ``severity`` is what a violation took; None without a violation.
+    ``decided`` are the genes with which the flight repeats without a director that decides in it.
     """
 
     outcome: str
@@ -60,6 +61,7 @@ class FlightResult:
     off_marker_m: float | None = None
     landed_s: float | None = None
     severity: Severity | None = None
+    decided: tuple[tuple[str, float], ...] = ()
 
     @property
     def signature(self) -> str:

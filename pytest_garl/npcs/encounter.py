@@ -229,7 +229,7 @@ class Passage:
             marker_position_m=self._marker_m,
             map=self._map,
             scenario=placed.scenario,
-            moments_s=(*self._moments[step], npc.met_s),
+            moments_s=(*self._moments[step], npc.met_s, npc.decided_s),
         )
 
     def _touches(self, npc: Npc, time_s: float, uav_m: Sequence[float]) -> bool:

@@ -15,10 +15,11 @@ from pytest_garl.scenarios.scenario import Scenario
 
 GRADES = ("careless", "curious", "chasing", "hostile")
 """Grades of behaviour from the weakest to the strongest (:mod:`pytest_garl.npcs.grades`)."""
-MET = "met"
-STORY_MOMENTS = (*MOMENTS, MET)
-"""What a story waits for: a moment of the landing, or the last one at which the NPC can still reach
-the UAV before that is down where the NPC is.  The delay counts from there."""
+MET, DECIDED = "met", "decided"
+STORY_MOMENTS = (*MOMENTS, MET, DECIDED)
+"""What a story waits for: a moment of the landing; the last one at which the NPC can still reach
+the UAV before that is down where the NPC is; or the decision of the learned director
+(:mod:`pytest_garl.npcs.director`).  A delay counts from there, but for a decision."""
 _IN_WORDS = (
     "the flight begins",
     "the UAV passes 8 m",
@@ -27,6 +28,7 @@ _IN_WORDS = (
     "the marker can be read for the first time",
     "the marker can no longer be read",
     "it can just meet the UAV",
+    "the director lets it go",
 )
 CURIOUS_S = 20.0
 """Longest interference of a curious NPC: engineering estimate of how long somebody looks at a UAV
@@ -94,9 +96,10 @@ def _value(
     return StoryValue(quantity=quantity, draws=draws, grades=grades, types=types)
 
 
-def _chosen(name: str, choices: tuple[str, ...], **others: Any) -> StoryValue:
+def _chosen(name: str, choices: tuple[str, ...], *, last: int = 1, **others: Any) -> StoryValue:
+    """Return a value with choices; the last one is drawn ``last`` times as often as another."""
     count = len(choices)
-    draws = 0.0, count - 1e-6
+    draws = 0.0, count - 1 + last - 1e-6
     return _value(name, low=0.0, high=count - 1.0, draws=draws, choices=choices, **others)
 
 
@@ -121,6 +124,7 @@ STORY: Mapping[str, StoryValue] = {
         _chosen(
             "phase",
             STORY_MOMENTS,
+            last=len(STORY_MOMENTS),
             meaning="the moment for which it waits before it comes",
             source="what goes wrong depends on what the UAV does when an NPC comes",
         ),
@@ -217,16 +221,26 @@ def story_of(scenario: Scenario, name: str) -> Story | None:
         return None
     found = {each: _flown(scenario, name, each) for each in STORY}
     grade = GRADES[int(found["grade"])]
+    moment = int(found["phase"])
+    is_decided = STORY_MOMENTS[moment] == DECIDED
+    if is_decided and grade == GRADES[0]:
+        # Who perceives nothing decides nothing, and comes just in time.
+        moment = STORY_MOMENTS.index(MET)
     return Story(
         grade=grade,
-        phase=int(found["phase"]),
-        delay_s=found["delay_s"],
+        phase=moment,
+        delay_s=0.0 if is_decided else found["delay_s"],
         lasts_s=min(found["lasts_s"], LIMITS_S[grade]),
         crossing_m=(found["crosses_x_m"], found["crosses_y_m"]),
         pause_s=found["pause_s"],
         stoop_m=found["stoop_m"],
         is_child=bool(found["body"]),
     )
+
+
+def waits_for_decision(story: Story) -> bool:
+    """Whether the director decides when an NPC comes."""
+    return STORY_MOMENTS[story.phase] == DECIDED
 
 
 def has_story(scenario: Scenario, name: str) -> bool:

@@ -9,7 +9,15 @@ from pytest_garl.flight.detectability import READABLE, readable_probability
 from pytest_garl.flight.flight import Flight, MarkerView
 from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.scenarios.groups import MOMENTS
-from pytest_garl.scenarios.story import MET
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import (
+    DECIDED,
+    MET,
+    STORY,
+    STORY_MOMENTS,
+    story_of,
+    waits_for_decision,
+)
 
 HEIGHTS_M = (8.0, 3.0, 0.1)
 """Heights of the feet above the ground that begin the moments after the start."""
@@ -78,12 +86,40 @@ class RecordedMoments:
 
     def of_npc(self, name: str) -> tuple[float, ...]:
         """Return when each moment came for which the story of an NPC may wait."""
-        return (*self.began_s, self._came.get(met_by(name), math.inf))
+        own = (self._came.get(moment_of(each, name), math.inf) for each in (MET, DECIDED))
+        return (*self.began_s, *own)
 
 
-def met_by(name: str) -> str:
-    """Return the name in a record of the moment at which an NPC could just meet the UAV."""
-    return f"{MET} {name}"
+def moment_of(moment: str, name: str) -> str:
+    """Return the name in a record of a moment that only one NPC has."""
+    return f"{moment} {name}"
+
+
+def decided_genes(
+    scenario: Scenario, flight: Flight, *, decides: bool
+) -> tuple[tuple[str, float], ...]:
+    """Return the genes with which a flight repeats if nobody decides: what was decided in it.
+
+    ``decides`` says whether its NPC policy decides who begins when.  An NPC that was let go begins
+    after the last moment of the landing before that, by whole milliseconds, rounded down, so that
+    it begins with the same decision; one that was not comes too late for the flight.
+    """
+    moments, genes = RecordedMoments(flight), []
+    for key, value in scenario.genes:
+        name, _, value_name = key.partition(".")
+        if value_name != "phase" or STORY_MOMENTS[int(STORY[value_name].flown(value))] != DECIDED:
+            continue
+        story, went_s = story_of(scenario, name), moments.of_npc(name)[-1]
+        if not decides or story is None or not waits_for_decision(story):
+            number, delay_s = STORY_MOMENTS.index(MET), 0.0
+        elif math.isinf(went_s):
+            number, delay_s = 0, STORY["delay_s"].quantity.high
+        else:
+            came = [each if each <= went_s else -math.inf for each in moments.began_s]
+            number = came.index(max(came))
+            delay_s = math.floor((went_s - came[number]) * 1000) / 1000
+        genes += [(key, float(number)), (f"{name}.delay_s", delay_s)]
+    return tuple(genes)
 
 
 def _of_track(flight: Flight) -> LandingMoments:

@@ -226,7 +226,7 @@ class Loop:
             marker_position_m=self._placed.marker_m,
             map=self.map,
             scenario=self.scenario,
-            moments_s=(*self.moments.began_s, npc.met_s),
+            moments_s=(*self.moments.began_s, npc.met_s, npc.decided_s),
         )
 
     def _under(self, place: tuple[float, float]) -> str:

@@ -79,13 +79,15 @@ class Move:
     """The wanted velocity until the next decision, as a share (x, y) of the NPC's speed.
 
     Its length is at most 1; the paper's five actions are (0, 1), (0, -1), (-1, 0), (1, 0)
-    and (0, 0).  A policy may change the environment as well: ``changes`` take effect at once,
+    and (0, 0).  ``begins`` says that the NPC begins its part, if its story waits for this decision.
+    A policy may change the environment as well: ``changes`` take effect at once,
     each clipped to the gene's range, and are part of the flight's record.
     """
 
     x: float
     y: float
     changes: tuple[GeneChange, ...] = ()
+    begins: bool = False
 
 
 STAY = Move(x=0.0, y=0.0)
@@ -168,6 +170,11 @@ class PolicySpec:
         if isinstance(told, str):
             return told
         return "hostile" if self.reads_uav else "careless"
+
+    @property
+    def decides_begin(self) -> bool:
+        """Whether it decides when an NPC begins whose story waits for that."""
+        return bool(getattr(self._load(), "decides_begin", False))
 
     def _load(self) -> Any:
         module, _, attribute = self.factory.partition(":")

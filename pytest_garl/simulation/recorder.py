@@ -26,9 +26,10 @@ from pytest_garl.flight.flight import (
 )
 from pytest_garl.landing_system import Command
 from pytest_garl.scenarios.placed import Placed
+from pytest_garl.scenarios.story import DECIDED, MET
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Renderer
-from pytest_garl.simulation.landing_moments import LandingMoments, met_by
+from pytest_garl.simulation.landing_moments import LandingMoments, moment_of
 from pytest_garl.simulation.physics.npc import Npc
 
 Vector = tuple[float, float, float]
@@ -169,11 +170,12 @@ class Recorder:
             )
         )
 
-    def _met(self) -> Iterator[tuple[str, float]]:
-        """Yield when each NPC could just meet the UAV."""
+    def _of_npcs(self) -> Iterator[tuple[str, float]]:
+        """Yield when each NPC could just meet the UAV, and when it was decided that it begins."""
         for item in self._objects:
-            if math.isfinite(item.met_s):
-                yield met_by(item.name), item.met_s
+            for moment, came_s in ((MET, item.met_s), (DECIDED, item.began_s)):
+                if math.isfinite(came_s):
+                    yield moment_of(moment, item.name), came_s
 
     def flight(
         self, outcome: Outcome, crash: Crash | None, touchdowns: Sequence[Touchdown]
@@ -215,7 +217,7 @@ class Recorder:
             touchdown=touchdowns[-1] if touchdowns else None,
             earlier_touchdowns=tuple(touchdowns[:-1]),
             data_read=tuple(name for name in OBSERVED if name in self.data_read),
-            moments=(*self.moments.record, *self._met()),
+            moments=(*self.moments.record, *self._of_npcs()),
         )
 
 

@@ -74,7 +74,7 @@ def walk(
                 marker_position_m=(0.0, 0.0),
                 map=placed.map,
                 scenario=scenario,
-                moments_s=(*known, npc.met_s),
+                moments_s=(*known, npc.met_s, npc.decided_s),
             )
             if tick == 0:
                 npc.policy.reset(situation, np.random.default_rng(0))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pytest_garl.npcs.interference import Interfering
+from pytest_garl.npcs.directed import Directed
 from pytest_garl.npcs.minds import Intercepting
 
 
-class Chasing(Interfering):
+class Chasing(Directed):
     """Interferes for a while, within the limits of its grade."""
 
     grade = "chasing"

@@ -13,6 +13,7 @@ class Graded:
     """Lets the policy of an NPC's own grade decide; domains that name a grade move NPCs so."""
 
     grade = ""
+    decides_begin = True
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Make the policy of the grade; raise PolicyError if the scenario has no story."""

@@ -60,6 +60,8 @@ class Npc:
         self._marker_m = placed.marker_m
         self.met_s = math.inf
         """When it could just meet the UAV; infinite if it could not yet."""
+        self.began_s = math.inf
+        """When its policy decided that it begins; infinite if it has not."""
         self._reserve_m = self.type.burst_m
         self._leap = Leap(own)
         self.bird_path = BirdPath(own, placed.marker_m) if self.flies else None
@@ -119,6 +121,8 @@ class Npc:
     def decide(self, situation: Situation) -> Move:
         """Ask the policy where to go; raise PolicyError if it fails or returns an invalid move."""
         move = decision(self.policy, situation)
+        if move.begins:
+            self.began_s = min(self.began_s, situation.time_s)
         self._start_move(move)
         return move
 
@@ -145,7 +149,7 @@ class Npc:
         """
         if math.isinf(self.met_s) and self._can_just_meet(uav_m, uav_mps):
             self.met_s = time_s
-        moments_s = (*landing_s, self.met_s)
+        moments_s = (*landing_s, self.met_s, self.decided_s)
         self._leap.update(time_s, moments_s, (self.x_m, self.y_m), uav_m)
         path = self.bird_path
         if path is not None and path.comes(time_s, moments_s):
@@ -167,6 +171,11 @@ class Npc:
         top_m = (path.lowest_m if path is not None else 0.0) + self.type.low_m + self.type.height_m
         left_s = (feet_height_m(uav_m[2]) - top_m) / sinks_mps
         return left_s * self.speed_mps <= math.dist(place, uav_m[:2])
+
+    @property
+    def decided_s(self) -> float:
+        """When its policy decided to begin; with a policy that decides no begin, when it met."""
+        return self.began_s if getattr(self.policy, "decides_begin", False) else self.met_s
 
     def advance(self, dt_s: float, others: Sequence[Npc] = ()) -> None:
         """Turn and accelerate towards the wanted velocity; slide along solids and ``others``."""
