@@ -1,0 +1,145 @@
+"""One search for a landing system of any module: a row per flight, and an end at the first find.
+
+    python -m lab.one_search landing_systems.opencv_mls:OpenCvLandingSystem --map=court
+        --seed=300 --arm=garl --flights=100 --until=^IV:person --out=flights.csv
+
+flies the domain `field` until a flight's signature matches ``--until``, a regular expression, or
+until all flights are flown.  The flights of a generation fly at once; a search has the same rows
+for any number of workers.  A search that is whole in the file is not flown again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from lab.ablations import VARIANTS
+from lab.table import ResultTable
+from pytest_garl import cpu_dispatch
+from pytest_garl.execution.fly_and_judge import judged
+from pytest_garl.execution.reference import Reference
+from pytest_garl.execution.result import FlightResult, Origin
+from pytest_garl.npcs.domain_policy import policy_in
+from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY, policy_spec
+from pytest_garl.scenarios.domains.domain_file import domain_named
+from pytest_garl.scenarios.domains.genome import genome_of
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.method import FlownScenario, SearchPlan
+from pytest_garl.simulation.fly import fly
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
+
+DOMAIN = domain_named("field")
+COLUMNS = (
+    *("system", "map", "arm", "seed", "flight", "how", "parents"),
+    *("signature", "no_landing", "elapsed_s", "is_last"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchTask:
+    """What is searched: the landing system "module:Class", map, arm and seed, and until when."""
+
+    system: str
+    map: str
+    arm: str
+    seed: int
+    flights: int
+    until: str = ""
+    """A regular expression for a signature; empty if all flights are flown."""
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """What identifies the search in a table."""
+        return self.system, self.map, self.arm, str(self.seed)
+
+
+def fly_one(system: str, scenario: Scenario) -> FlightResult:
+    """Fly a landing system through a scenario; return the judged result."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    module, _, name = system.partition(":")
+    landing_system = Reference(module=module, file="", qualname=name).load()
+    npcs = policy_spec(policy_in(DOMAIN, DEFAULT_POLICY))
+    flight = fly(scenario, landing_system, npcs, map=load_map(scenario.map))
+    return judged(flight, DEFAULT_LIMITS)
+
+
+def rows_of(
+    task: SearchTask, fly_all: Callable[[Sequence[Scenario]], Iterator[FlightResult]]
+) -> Iterator[dict[str, Any]]:
+    """Yield the row of each flight, up to the first that matches."""
+    map = load_map(task.map)
+    size = max(2, min(20, task.flights // 10))
+    plan = SearchPlan(map=map, genome=genome_of(DOMAIN, map), seed=task.seed, population=size)
+    method, flown = VARIANTS[task.arm](plan), 0
+    while flown < task.flights:
+        scenarios = list(method.ask())
+        origins = getattr(method, "origins", ()) or [Origin(how="control")] * len(scenarios)
+        results: list[FlightResult] = []
+        flights = fly_all(scenarios[: task.flights - flown])
+        for result, origin in zip(flights, origins, strict=False):
+            results.append(result)
+            flown += 1
+            hit = bool(task.until) and re.search(task.until, result.signature) is not None
+            is_last = hit or flown == task.flights
+            yield {
+                **dict(zip(COLUMNS, task.key, strict=False)),
+                "flight": flown,
+                "how": origin.how,
+                "parents": " ".join(origin.parents),
+                "signature": result.signature,
+                "no_landing": result.verdict.no_landing or "",
+                "elapsed_s": round(result.elapsed_s, 3),
+                "is_last": int(is_last),
+            }
+            if is_last:
+                return
+        if method.learns:
+            pairs = zip(scenarios, results, strict=True)
+            method.tell([FlownScenario(scenario=each, result=result) for each, result in pairs])
+
+
+def run(task: SearchTask, table: ResultTable, pool: Executor) -> None:
+    """Append the rows of a search, unless the table has all of them."""
+    own = [row for row in table.rows() if tuple(row[name] for name in COLUMNS[:4]) == task.key]
+    if any(row["is_last"] == "1" for row in own):
+        return
+    known = {row["flight"] for row in own}
+    fly_all = functools.partial(pool.map, functools.partial(fly_one, task.system))
+    # A search that was interrupted is flown again, and its rows are the same.
+    table.append(row for row in rows_of(task, fly_all) if str(row["flight"]) not in known)
+
+
+def main() -> None:
+    """Fly one search."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("system", metavar="MODULE:CLASS")
+    parser.add_argument("--map", default="court")
+    parser.add_argument("--arm", choices=tuple(VARIANTS), default="garl")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--flights", type=int, default=100)
+    parser.add_argument("--until", default="", help="regular expression; without it all are flown")
+    parser.add_argument("--out", type=Path, default=Path("flights.csv"))
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    named = vars(parser.parse_args())
+    table = ResultTable(file=named.pop("out"), columns=COLUMNS, key=(*COLUMNS[:4], "flight"))
+    workers = named.pop("workers")
+    cpu_dispatch.pin()
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        run(SearchTask(**named), table, pool)
+
+
+if __name__ == "__main__":
+    main()

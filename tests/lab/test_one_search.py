@@ -1,0 +1,78 @@
+"""One search of the lab: a row per flight, an end at the first find, nothing flown twice."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from lab import one_search
+from lab.one_search import COLUMNS, SearchTask, rows_of, run
+from lab.stand_in import stand_in
+from lab.stand_in_way import ORDINARY
+from lab.table import ResultTable
+from pytest_garl.execution.result import FlightResult
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.scenario import Scenario
+
+TASK = SearchTask(system="here:Stack", map="court", arm="garl", seed=301, flights=50)
+MAP = load_map("court")
+
+
+def arithmetic(scenario: Scenario) -> FlightResult:
+    return stand_in(scenario, MAP, ORDINARY)
+
+
+def fly_all(scenarios: Sequence[Scenario]) -> Iterator[FlightResult]:
+    return map(arithmetic, scenarios)
+
+
+def test_a_search_has_a_row_for_each_flight_and_children_name_their_parents() -> None:
+    rows = list(rows_of(TASK, fly_all))
+    assert [row["flight"] for row in rows] == [*range(1, 51)]
+    assert {row["how"] for row in rows} == {"control", "stratified", "bred"}
+    bred = [row for row in rows if row["how"] == "bred"]
+    assert len(bred) >= (50 - 5) / 2
+    assert all(len(row["parents"].split()) >= 2 for row in bred)
+    assert [row["is_last"] for row in rows].index(1) == 49
+
+
+def test_a_search_ends_at_the_first_flight_that_matches() -> None:
+    whole = [row["signature"] for row in rows_of(TASK, fly_all)]
+    wanted = next(each for each in whole if each.startswith("IV"))
+    rows = list(rows_of(dataclasses.replace(TASK, until="^IV"), fly_all))
+    assert [row["signature"] for row in rows] == whole[: whole.index(wanted) + 1]
+    assert rows[-1]["is_last"] == 1
+
+
+def test_an_arm_without_children_has_none() -> None:
+    rows = rows_of(dataclasses.replace(TASK, arm="exploring"), fly_all)
+    assert "bred" not in {row["how"] for row in rows}
+
+
+def test_a_search_goes_on_where_its_table_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flown: list[Scenario] = []
+
+    def fly_one(system: str, scenario: Scenario) -> FlightResult:
+        flown.append(scenario)
+        return arithmetic(scenario)
+
+    monkeypatch.setattr(one_search, "fly_one", fly_one)
+    whole = ResultTable(file=tmp_path / "whole.csv", columns=COLUMNS, key=COLUMNS[:5])
+    with ThreadPoolExecutor(1) as pool:
+        go = functools.partial(run, TASK, pool=pool)
+        go(whole)
+        assert len(flown) == 50
+        cut = ResultTable(file=tmp_path / "cut.csv", columns=COLUMNS, key=COLUMNS[:5])
+        cut.file.write_text("".join(whole.file.read_text().splitlines(keepends=True)[:18]))
+        go(cut)
+        assert cut.file.read_bytes() == whole.file.read_bytes()
+        flown.clear()
+        go(whole)
+    assert not flown
