@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.scenarios.genes import MOST_ACTIVE, OFF, ON, ON_ABOVE, Genome, NuclearGene
-from pytest_garl.scenarios.story import GRADES
+from pytest_garl.scenarios.story import GRADES, STORY
 from pytest_garl.search.operators import Matrix
 
 Mask = NDArray[np.bool_]
@@ -42,17 +42,20 @@ class Columns:
     """The columns of one genome.
 
     ``outward`` are those whose values are harsher the farther they lie from nominal, ``chosen``
-    those that are flown as whole numbers, and ``named`` those of them that are choices.  ``owner``
-    is the name of each column's gene, ``slices`` are the columns of each nuclear gene, ``optional``
-    the genes with a bit of activity, ``bits`` the columns of these bits.
+    those that are flown as whole numbers.  ``owner`` is the name of each column's gene, ``slices``
+    are the columns of each nuclear gene, ``optional`` the genes with a bit of activity, ``bits``
+    the columns of these bits.
     """
 
     def __init__(self, genome: Genome) -> None:
         self.genome = genome
         self.lower, self.upper, self.nominal = genome.lower, genome.upper, genome.nominal
         self.outward: Mask = np.array([not item.even for item in genome.properties])
-        self.named: Mask = np.array([bool(each.choices) for each in genome.properties])
-        self.chosen: Mask = self.named | np.array([each.whole for each in genome.properties])
+        self._whole: Mask = np.array([item.whole for item in genome.properties])
+        choices = [len(item.choices) for item in genome.properties]
+        self.chosen: Mask = self._whole | (np.array(choices) > 0)
+        self._last = np.array([float(count - 1) if count else np.inf for count in choices])
+        self._of_story: Mask = np.array([key.partition(".")[2] in STORY for key in genome.keys])
         self.owner = tuple(gene.name for gene in genome.genes for _ in gene.properties)
         firsts = [0, *genome.borders]
         self.slices = tuple(
@@ -65,6 +68,12 @@ class Columns:
             if gene.is_optional
         )
         self.bits = frozenset(gene.bit for gene in self.optional)
+
+    def numbers(self, rows: Matrix) -> Matrix:
+        """Return the numbers that chromosomes (m, d) fly in the ``chosen`` columns."""
+        rounded = np.where(self._of_story, np.floor(rows), np.ceil(rows))
+        found: Matrix = np.minimum(np.where(self._whole, np.round(rows), rounded), self._last)
+        return found
 
     @property
     def limit(self) -> int:

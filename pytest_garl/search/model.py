@@ -146,8 +146,8 @@ class MarginModel:
     def _scaled(self, rows: Matrix) -> Matrix:
         """Return the values as shares of their range from nominal, and choices as their number."""
         scaled = (rows - self._columns.nominal) / self._span
-        chosen, named = self._columns.chosen, self._columns.named
-        scaled[:, chosen] = np.where(named, np.ceil(rows), np.round(rows))[:, chosen]
+        chosen = self._columns.chosen
+        scaled[:, chosen] = self._columns.numbers(rows)[:, chosen]
         return scaled
 
     def _acting(self, rows: Matrix) -> Sequence[tuple[Mask, range]]:

@@ -43,7 +43,10 @@ class Wild:
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
-        ("far", r"deciding for person-1: found Move\(x=1.0, y=1.0, changes=\(\), begins=False\); expected"),
+        (
+            "far",
+            r"deciding for person-1: found Move\(x=1.0, y=1.0, .*begins=False\); expected",
+        ),
         ("nan", "found Move"),
         ("number", "found 7; expected Move"),
         ("words", "found Move"),

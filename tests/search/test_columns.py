@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.columns import Columns
 from pytest_garl.search.exploration import Exploration
 
@@ -61,7 +63,7 @@ def test_slices_hold_all_columns_of_their_gene_and_its_bit() -> None:
 def test_choices_and_other_whole_numbers_are_told_from_numbers() -> None:
     keys = FIELD.genome.keys
     kind = keys.index("decoy-1.kind")
-    assert FIELD.named[kind]
+    assert FIELD.chosen[kind]
     assert FIELD.chosen[kind]
     assert not FIELD.chosen[keys.index("wind.mean_mps")]
 
@@ -74,3 +76,21 @@ def test_the_stratum_is_that_of_the_strongest_grade() -> None:
     assert FIELD.stratum(row) == "careless"
     row[keys.index("dog-1.grade")] = 2.5
     assert FIELD.stratum(row) == "interfering"
+
+
+def test_a_choice_has_the_number_that_is_flown() -> None:
+    genome, rng = FIELD.genome, np.random.default_rng(4)
+    rows = np.array(
+        [genome.random_active(rng, ("person-1", "cover", "decoy-1")) for _ in range(40)]
+    )
+    scenarios = [
+        repair(decode(row, genome, map="court", seed=number), MAP)
+        for number, row in enumerate(rows)
+    ]
+    flown = FIELD.numbers(np.array([encode(scenario, genome) for scenario in scenarios]))
+    chosen = [
+        genome.keys.index(key)
+        for key in ("person-1.grade", "person-1.phase", "cover.after", "decoy-1.kind")
+    ]
+    assert np.array_equal(FIELD.numbers(rows)[:, chosen], flown[:, chosen])
+    assert len({*flown[:, chosen[1]]}) > 4
