@@ -97,7 +97,7 @@ def judge_record(
         record = measured(record)
     result = judged(record, job.limits)
     severity = severity_of(record, result.verdict, scenario, map, job.npcs)
-    decided = decided_genes(scenario, record, decides=job.npcs.decides_begin)
+    decided = decided_genes(scenario, record, job.npcs)
     result = dataclasses.replace(result, severity=severity, decided=decided)
     return result, record.sha256, record.wall_s
 

@@ -18,6 +18,7 @@ from pytest_garl.scenarios.story import (
     story_of,
     waits_for_decision,
 )
+from pytest_garl.simulation.npc_policy import PolicySpec
 
 HEIGHTS_M = (8.0, 3.0, 0.1)
 """Heights of the feet above the ground that begin the moments after the start."""
@@ -96,13 +97,13 @@ def moment_of(moment: str, name: str) -> str:
 
 
 def decided_genes(
-    scenario: Scenario, flight: Flight, *, decides: bool
+    scenario: Scenario, flight: Flight, npcs: PolicySpec
 ) -> tuple[tuple[str, float], ...]:
     """Return the genes with which a flight repeats if nobody decides: what was decided in it.
 
-    ``decides`` says whether its NPC policy decides who begins when.  An NPC that was let go begins
-    after the last moment of the landing before that, by whole milliseconds, rounded down, so that
-    it begins with the same decision; one that was not comes too late for the flight.
+    ``npcs`` is the policy that moved the NPCs, which may decide no begin.  An NPC that was let go
+    begins after the last moment of the landing before that, by whole milliseconds, rounded down, so
+    that it begins with the same decision; one that was not comes too late for the flight.
     """
     moments, genes = RecordedMoments(flight), []
     for key, value in scenario.genes:
@@ -110,7 +111,7 @@ def decided_genes(
         if value_name != "phase" or STORY_MOMENTS[int(STORY[value_name].flown(value))] != DECIDED:
             continue
         story, went_s = story_of(scenario, name), moments.of_npc(name)[-1]
-        if not decides or story is None or not waits_for_decision(story):
+        if not npcs.decides_begin or story is None or not waits_for_decision(story):
             number, delay_s = STORY_MOMENTS.index(MET), 0.0
         elif math.isinf(went_s):
             number, delay_s = 0, STORY["delay_s"].quantity.high

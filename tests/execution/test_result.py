@@ -71,6 +71,7 @@ def test_text_holds_the_keys_that_stored_ledgers_have() -> None:
         "closest_call",
         "collisions",
         "crash",
+        "decided",
         "elapsed_s",
         "final_distance_m",
         "landed_s",

@@ -64,7 +64,7 @@ def test_a_scenario_with_the_decision_flies_the_same(
     monkeypatch.setattr(directed, "shipped_director", lambda: director)
     scenario = waiting(name, 2.0, speed)
     live = flown(scenario)
-    genes = dict(decided_genes(scenario, live, decides=GRADED.decides_begin))
+    genes = dict(decided_genes(scenario, live, GRADED))
     again = scenario.replace(genes)
     story = story_of(again, name)
     assert story is not None
@@ -81,7 +81,7 @@ def test_an_npc_that_is_never_let_go_repeats_as_one_that_comes_too_late(
     monkeypatch.setattr(directed, "shipped_director", lambda: GoesAfter(10**6))
     scenario = waiting("person-1", 1.0)
     live = flown(scenario)
-    again = scenario.replace(dict(decided_genes(scenario, live, decides=True)))
+    again = scenario.replace(dict(decided_genes(scenario, live, GRADED)))
     assert flown(again).sha256 == live.sha256
 
 
@@ -90,8 +90,7 @@ def test_an_npc_that_is_never_let_go_repeats_as_one_that_comes_too_late(
 def test_who_decides_nothing_comes_just_in_time(policy: str) -> None:
     scenario = waiting("bird-1", 0.0 if policy == "graded" else 2.0, 9.0)
     live = flown(scenario, policy)
-    decides = policy_spec(policy).decides_begin
-    again = scenario.replace(dict(decided_genes(scenario, live, decides=decides)))
+    again = scenario.replace(dict(decided_genes(scenario, live, policy_spec(policy))))
     story = story_of(again, "bird-1")
     assert story is not None
     assert STORY_MOMENTS[story.phase] == "met"
