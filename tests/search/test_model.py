@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -108,9 +109,9 @@ def test_only_the_latest_flights_are_fitted(monkeypatch: pytest.MonkeyPatch) -> 
     assert expected.likeness.shape == (6, 4)
 
 
-def near_of(name: MarginName, value: float, **result: object) -> float:
+def near_of(name: MarginName, value: float, **result: Any) -> float:
     margins = (Margin(property=name, value=value, unit="m"),)
-    found = proximities(flight_result(margins=margins, **result))  # type: ignore[arg-type]
+    found = proximities(flight_result(margins=margins, **result))
     return float(found[PROPERTIES.index(name)])
 
 

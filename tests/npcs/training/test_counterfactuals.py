@@ -23,7 +23,7 @@ from pytest_garl.npcs.training.counterfactuals import (
     table_of,
 )
 from pytest_garl.npcs.training.graded_landing import draw_graded_landing
-from pytest_garl.npcs.training.presets import PRESETS
+from pytest_garl.npcs.training.presets import PRESETS, Uav
 from pytest_garl.scenarios.story import story_of
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S
 from tests.npcs.training.surrogates import COURT
@@ -58,8 +58,8 @@ def test_an_end_is_what_a_contact_means() -> None:
 
 @pytest.mark.sim
 @pytest.mark.parametrize("uav", ["straight", "avoiding"])
-def test_what_geometry_says_of_a_moment_is_what_a_landing_shows(uav: str) -> None:
-    surrogate = dataclasses.replace(CHASED, uav=uav)  # type: ignore[arg-type]
+def test_what_geometry_says_of_a_moment_is_what_a_landing_shows(uav: Uav) -> None:
+    surrogate = dataclasses.replace(CHASED, uav=uav)
     landing = draw_graded_landing(surrogate, np.random.default_rng(5))
     table = table_of(5, landing)
     assert len(table.meetings) == math.ceil(len(table.features) / STRIDE)
