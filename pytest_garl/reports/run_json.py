@@ -81,6 +81,7 @@ def _search(run: RunRecord, search: SearchRecord) -> dict[str, Any]:
         "control": _control(search, search.control) if search.control else None,
         "origins": [dataclasses.asdict(each) for each in search.origins],
         "model": None if search.model is None else dataclasses.asdict(search.model),
+        "movers": None if search.movers is None else dataclasses.asdict(search.movers),
         "signatures": [
             {
                 **_kind(run, search, kind),

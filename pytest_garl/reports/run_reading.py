@@ -29,7 +29,7 @@ from pytest_garl.reports.run_record import (
     SearchRecord,
     place_of,
 )
-from pytest_garl.reports.search_origins import Made, model_record, origin_records
+from pytest_garl.reports.search_origins import Made, model_record, mover_record, origin_records
 from pytest_garl.scenarios.files import dump_scenario
 
 _NONE: Mapping[str, tuple[Severity, str]] = MappingProxyType({})
@@ -146,6 +146,7 @@ def _search(
         control=control,
         origins=origin_records(made),
         model=model_record(made),
+        movers=mover_record((flight, jobs[flight.id.search].npcs) for flight in flights),
         camera=facts.camera(key.system),
     )
 

@@ -23,7 +23,7 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.severity import Severity
 from pytest_garl.reports.causes import cause_of, tells_cause, title_of
 from pytest_garl.reports.control_arm import ControlArm
-from pytest_garl.reports.search_origins import ModelRecord, OriginRecord
+from pytest_garl.reports.search_origins import ModelRecord, MoverRecord, OriginRecord
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.verdicts.ending import ending_of
 from pytest_garl.verdicts.kinds import hill_number
@@ -210,6 +210,8 @@ class SearchRecord:
     """What the scenarios that were made in one way found; none if the method does not tell."""
     model: ModelRecord | None = None
     """How well the model of the landing system predicted; None without one."""
+    movers: MoverRecord | None = None
+    """Who moved the NPCs; None without NPCs."""
     camera: Mapping[str, Any] | None = None
     """What the ledger says of the landing system's camera; None if it does not."""
 

@@ -47,7 +47,8 @@ def run_text(run: RunRecord) -> str:
             f"gave up: {counts_text(search.gave_up)}"
             f"{f'; ran out of time: {counts_text(late)}' if any(late.values()) else ''}"
         )
-        lines += [f"  {text}" for text in (control_text(search), origins_text(search)) if text]
+        told = (control_text(search), origins_text(search), movers_text(search))
+        lines += [f"  {text}" for text in told if text]
         lines += [line for kind in search.kinds for line in _kind_lines(run, search, kind)]
     return "\n".join([*lines, ""]) if lines else "no flights yet\n"
 
@@ -113,7 +114,12 @@ def kinds_lines(search: SearchRecord) -> list[str]:
     diverse = (
         f"{number} kinds of violation{causes}, as diverse as {effective:.1f} equally frequent ones"
     )
-    texts = diverse if number > 1 else "", control_text(search), origins_text(search)
+    texts = (
+        diverse if number > 1 else "",
+        control_text(search),
+        origins_text(search),
+        movers_text(search),
+    )
     return [text for text in texts if text]
 
 
@@ -158,6 +164,34 @@ def origins_text(search: SearchRecord) -> str:
         else ""
     )
     return f"new kinds: {', '.join(found)}{expected}"
+
+
+def movers_text(search: SearchRecord) -> str:
+    """Return who moved the NPCs; empty without NPCs.
+
+    Such as ``who said when NPCs begin: the learned director for 12, the rule (just in time) for 3,
+    their genes for 9; the director decided in 11 of 15 flights with an NPC that knows of the UAV``.
+    """
+    movers = search.movers
+    if movers is None:
+        return ""
+    found = [
+        f"{name} for {count}"
+        for name, count in (
+            ("the learned director", movers.director),
+            ("the rule (just in time)", movers.rule),
+            ("their genes", movers.gene),
+            (f"the policy {' and '.join(search.npcs)}", movers.policy),
+        )
+        if count
+    ]
+    told = f"who said when NPCs begin: {', '.join(found)}"
+    if not movers.directed:
+        return told
+    return (
+        f"{told}; the director decided in {movers.directed} of {movers.interfering} flights with "
+        "an NPC that knows of the UAV"
+    )
 
 
 def in_control_text(in_control: int | None, random_flights: int) -> str:

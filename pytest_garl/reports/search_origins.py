@@ -1,21 +1,35 @@
-"""What chance, stratified draws and evolution each found in a search, and how the model did."""
+"""What each way to make scenarios found in a search, how the model did, who moved the NPCs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import How, Origin
+from pytest_garl.npcs.domain_policy import GRADED
+from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import GRADES, MET, STORY_MOMENTS, story_of, waits_for_decision
 from pytest_garl.search.model import PROPERTIES, proximities
 from pytest_garl.search.operators import Matrix
+from pytest_garl.simulation.npc_policy import PolicySpec
 
 HOWS: tuple[How, ...] = ("control", "stratified", "bred")
 
 Made = Sequence[tuple[LedgerFlight, Origin]]
 """The flights of a search in order, each with how its scenario was made."""
+Mover = Literal["director", "rule", "gene", "policy"]
+"""Who says when an NPC begins: the learned director, in flight; the rule that it comes just in
+time; the moment and the delay of its story; or a policy that reads no story and moves it from the
+start."""
+MOVERS: tuple[Mover, ...] = ("director", "rule", "gene", "policy")
+READ_STORIES = (GRADED, *GRADES[:-1])
+"""The policies whose NPCs begin as their stories say.  A hostile NPC attacks from the start."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +61,58 @@ class ModelRecord:
     violating: int
     error: float
     error_of_mean: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoverRecord:
+    """Who moved the NPCs of a search.
+
+    ``director``, ``rule``, ``gene`` and ``policy`` are numbers of NPCs.  ``interfering`` is how
+    many flights have an NPC whose story lets it know of the UAV, ``directed`` in how many of these
+    the learned director decides for such an NPC.
+    """
+
+    director: int
+    rule: int
+    gene: int
+    policy: int
+    interfering: int
+    directed: int
+
+
+def movers_in(scenario: Scenario, npcs: PolicySpec) -> Iterator[tuple[Mover, bool]]:
+    """Yield for each NPC of a scenario who moves it, and whether its story knows of the UAV."""
+    reads_story = npcs.name in READ_STORIES
+    for key, _ in scenario.genes:
+        name, _, value = key.partition(".")
+        if value != "velocity":
+            continue
+        story = story_of(scenario, name)
+        if story is None or not reads_story:
+            # It may be a user's own, and gone when somebody reads the ledger.
+            yield "policy", False
+        else:
+            knows = (npcs.grade or story.grade) != GRADES[0]
+            if waits_for_decision(story):
+                yield "director" if npcs.decides_begin and knows else "rule", knows
+            else:
+                yield "rule" if STORY_MOMENTS[story.phase] == MET else "gene", knows
+
+
+def mover_record(flown: Iterable[tuple[LedgerFlight, PolicySpec]]) -> MoverRecord | None:
+    """Return who moved the NPCs of flights; None if no flight has an NPC."""
+    counts: Counter[Mover] = Counter()
+    interfering = directed = 0
+    for flight, npcs in flown:
+        movers = list(movers_in(parse_scenario(flight.scenario), npcs))
+        counts.update(mover for mover, _ in movers)
+        interfering += any(knows for _, knows in movers)
+        directed += any(mover == "director" for mover, _ in movers)
+    if not counts:
+        return None
+    return MoverRecord(
+        **{mover: counts[mover] for mover in MOVERS}, interfering=interfering, directed=directed
+    )
 
 
 def origin_records(made: Made) -> tuple[OriginRecord, ...]:

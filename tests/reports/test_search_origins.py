@@ -11,13 +11,22 @@ from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import Origin
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.reports.run_record import SearchRecord
-from pytest_garl.reports.run_text import origins_text
-from pytest_garl.reports.search_origins import model_record, origin_records
+from pytest_garl.reports.run_text import movers_text, origins_text
+from pytest_garl.reports.search_origins import (
+    MoverRecord,
+    model_record,
+    mover_record,
+    origin_records,
+)
+from pytest_garl.scenarios.files import dump_scenario
+from pytest_garl.scenarios.story import GRADES, STORY_MOMENTS
 from pytest_garl.search.model import PROPERTIES
 from pytest_garl.search.objectives import SAFE_MARGINS
 from pytest_garl.verdicts.verdict import Margin
 from tests.support.results import flight_result
+from tests.support.stories import scenario_with
 
 DOG, BIRD = "IV:dog:descent:seen", "IV:bird:descent:seen"
 CONTROL, DRAWN = Origin(how="control"), Origin(how="stratified")
@@ -99,3 +108,52 @@ def test_the_summary_tells_it_in_one_line() -> None:
     )
     drawn = dataclasses.replace(told, origins=told.origins[:2], model=None)
     assert origins_text(drawn) == "new kinds: 1 in 2 random flights, 1 in 1 stratified ones"
+
+
+def with_story(grade: str, moment: str, *, name: str = "dog-1") -> LedgerFlight:
+    values = {"grade": GRADES.index(grade), "phase": STORY_MOMENTS.index(moment)}
+    scenario = scenario_with(name, (-8.0, 0.0), 2.0, values)
+    return dataclasses.replace(flight(0, 0), scenario=dump_scenario(scenario))
+
+
+STORIES = (
+    with_story("chasing", "decided"),
+    with_story("curious", "decided", name="person-1"),
+    with_story("careless", "decided"),
+    with_story("chasing", "met"),
+    with_story("curious", "3 m"),
+    with_story("careless", "touchdown"),
+)
+
+
+def test_npcs_are_told_by_who_says_when_they_begin() -> None:
+    graded = policy_spec("graded")
+    assert mover_record((each, graded) for each in STORIES) == MoverRecord(
+        director=2, rule=2, gene=2, policy=0, interfering=4, directed=2
+    )
+
+
+def test_a_forced_grade_decides_for_all_npcs_or_for_none() -> None:
+    forced = mover_record((each, policy_spec("chasing")) for each in STORIES[2:4])
+    assert forced == MoverRecord(director=0, rule=2, gene=0, policy=0, interfering=2, directed=0)
+    careless = mover_record((each, policy_spec("careless")) for each in STORIES[:2])
+    assert careless == MoverRecord(director=0, rule=2, gene=0, policy=0, interfering=0, directed=0)
+    hostile = mover_record((each, policy_spec("hostile")) for each in STORIES)
+    assert hostile == MoverRecord(director=0, rule=0, gene=0, policy=6, interfering=0, directed=0)
+
+
+def test_who_moved_the_npcs_is_told_in_one_line() -> None:
+    key = SearchKey(system="my_landing:Mine", map="lawn")
+    search = SearchRecord(key=key, name=key.place, flights=(), kinds=(), violating=0)
+    assert movers_text(search) == ""
+    told = dataclasses.replace(
+        search, movers=mover_record((each, policy_spec("graded")) for each in STORIES)
+    )
+    assert movers_text(told) == (
+        "who said when NPCs begin: the learned director for 2, the rule (just in time) for 2, "
+        "their genes for 2; the director decided in 2 of 4 flights with an NPC that knows of the "
+        "UAV"
+    )
+    movers = mover_record([(STORIES[0], policy_spec("dqn"))])
+    moved = dataclasses.replace(search, movers=movers, npcs=("dqn",))
+    assert movers_text(moved) == "who said when NPCs begin: the policy dqn for 1"

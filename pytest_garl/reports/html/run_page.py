@@ -22,6 +22,7 @@ from pytest_garl.reports.run_text import (
     in_control_text,
     kinds_lines,
     limits_text,
+    movers_text,
     origins_text,
     percent,
 )
@@ -165,6 +166,8 @@ def figures(search: SearchRecord) -> list[Fact]:
                 "the mean of earlier flights",
             )
         )
+    if search.movers is not None:
+        found.append(("who moved the NPCs", movers_text(search)))
     return [figure for figure in found if figure[1]]
 
 
