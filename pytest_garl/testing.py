@@ -38,6 +38,7 @@ from pytest_garl.landing_system import (
 )
 from pytest_garl.npcs.domain_policy import domain_with_policy
 from pytest_garl.npcs.policy_catalogue import policy_spec
+from pytest_garl.program import AnySystem, ProgramSystem
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
@@ -148,7 +149,7 @@ class CheckPlan:
 
 
 def check_landing_system(
-    system: type,
+    system: AnySystem,
     *,
     seconds: float | None = None,
     map: str = "lawn",
@@ -160,7 +161,7 @@ def check_landing_system(
     limits: Limits | None = None,
     probes: bool = False,
 ) -> Check:
-    """Fly a class in two scenarios and return the result; raise LandingSystemError for a fault.
+    """Fly a class or a program in two scenarios; raise LandingSystemError for a fault.
 
     Checks that the class has the contract's methods and can be imported by a worker process, that
     its airframe is valid, that it returns commands, leaves its observations unchanged, decides the
@@ -220,15 +221,20 @@ def plan_for(
     )
 
 
-def check_as_planned(system: type, plan: CheckPlan) -> Check:
+def check_as_planned(system: AnySystem, plan: CheckPlan) -> Check:
     """Fly a class as a plan says, as ``check_landing_system`` does, in this process."""
     check_contract(system)
     return _Checker(system, plan).run()
 
 
-def check_contract(system: type) -> None:
-    """Raise LandingSystemError if a class has not the methods and the airframe of the contract."""
+def check_contract(system: AnySystem) -> None:
+    """Raise LandingSystemError if a class has not the methods and the airframe of the contract.
+
+    A program is asked whether it can be started.
+    """
     check_system(system)
+    if isinstance(system, ProgramSystem):
+        return
     _check_airframe(system)
     if hasattr(system, "observe_truth") and not is_own(system):
         raise LandingSystemError(
@@ -241,7 +247,7 @@ def check_contract(system: type) -> None:
 
 
 def _check_as_values(
-    system: type,
+    system: AnySystem,
     marker: dict[str, Any] | None,
     start: dict[str, Any] | None,
     limits: dict[str, Any] | None,
@@ -265,7 +271,7 @@ class _TimedFlight(NamedTuple):
 class _Checker:
     """Flies one class in a calm scenario and in a drawn one, both without moving objects."""
 
-    def __init__(self, system: type, plan: CheckPlan) -> None:
+    def __init__(self, system: AnySystem, plan: CheckPlan) -> None:
         self._system, self._plan = system, plan
         longest_s = time_limit_s(plan.limits)
         self._seconds = plan.seconds or longest_s
@@ -531,7 +537,7 @@ def _warning_of_leftovers(warn: Callable[[str], None]) -> Iterator[None]:
         warn(f"leaves {len(started)} processes running; a search ends them after each flight")
 
 
-def _reusing_one_instance(system: type, yaws: list[tuple[float, float]]) -> Any:
+def _reusing_one_instance(system: AnySystem, yaws: list[tuple[float, float]]) -> Any:
     """Return a stand-in for the class that always gives the same instance.
 
     It notes time and value of each commanded yaw beyond a full turn.

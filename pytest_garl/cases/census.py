@@ -23,6 +23,7 @@ from pytest_garl.cases.collected_tests import CollectedProject
 from pytest_garl.cases.corpus import Corpus, CorpusEntry, committed_cases, folder_of
 from pytest_garl.execution.sources import module_file
 from pytest_garl.files.bounded_files import MEGABYTE
+from pytest_garl.program import program_named
 
 _SIGNS_OF_A_CASE = (b"\ntrajectory_sha256 =", b"\n[violation]")
 """What each case file holds, under whatever name."""
@@ -193,6 +194,8 @@ def system_problem(system: str, root: Path) -> str:
     name, _, qualname = system.partition(":")
     module = sys.modules.get(name)
     if module is not None:
+        if program_named(name, qualname):
+            return ""
         found: object = module
         for part in qualname.split("."):
             if not hasattr(found, part):
@@ -221,6 +224,9 @@ def _defines(file: Path, name: str) -> bool:
             bound |= {(each.asname or each.name).partition(".")[0] for each in node.names}
         elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             bound.add(node.id)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("Program"):
+            # Its argument or its script names it: only to import the module would tell.
+            return True
     return bool({name, "*", "__getattr__"} & bound)
 
 

@@ -23,6 +23,7 @@ from pytest_garl.execution.sources import sources_sha256
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
 from pytest_garl.npcs.policy_catalogue import policy_spec
+from pytest_garl.program import AnySystem
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 
@@ -52,12 +53,12 @@ class Replay:
     same_flight: bool | None
 
 
-def system_of(case: Case, folder: Path) -> type:
+def system_of(case: Case, folder: Path) -> AnySystem:
     """Return the landing system's class, imported as from ``folder``."""
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
     try:
-        system: type = system_named(case.system)
+        system: AnySystem = system_named(case.system)
     except LandingSystemError as error:
         raise LandingSystemError(
             f"system {case.system!r}: cannot be imported from {folder} ({error}); run this where "

@@ -15,6 +15,7 @@ from pytest_garl.errors import LandingSystemError
 from pytest_garl.messages import python_that_lacks
 
 if TYPE_CHECKING:
+    from pytest_garl.program import AnySystem
     from pytest_garl.testing import CheckPlan
 
 LIMIT_S = 1800.0
@@ -71,7 +72,7 @@ def check(
         planned = [each for target in targets for each in _planned(target, maps)]
     probed = [] if no_probes else _probed(planned)
     passed = True
-    warned: dict[type, set[str]] = {}
+    warned: dict[AnySystem, set[str]] = {}
     # Nothing else interrupts a call that hangs in C code and holds the interpreter.
     faulthandler.dump_traceback_later(LIMIT_S, exit=True, file=sys.__stderr__ or 2)
     try:
@@ -92,7 +93,7 @@ def check(
         raise SystemExit(1)
 
 
-def _probed(planned: list[tuple[type, CheckPlan]]) -> list[tuple[type, CheckPlan]]:
+def _probed(planned: list[tuple[AnySystem, CheckPlan]]) -> list[tuple[AnySystem, CheckPlan]]:
     """Return what flies the probes: each landing system with each task, on one of its maps."""
     from pytest_garl.search.probes import probed_map
 
@@ -109,7 +110,7 @@ def _probed(planned: list[tuple[type, CheckPlan]]) -> list[tuple[type, CheckPlan
     return found
 
 
-def _planned(target: str, maps: tuple[str, ...]) -> Iterator[tuple[type, CheckPlan]]:
+def _planned(target: str, maps: tuple[str, ...]) -> Iterator[tuple[AnySystem, CheckPlan]]:
     """Yield what is to be flown for a test file or a class."""
     file = Path(target.partition("::")[0])
     if file.exists() or file.suffix == ".py" or "::" in target:
@@ -122,13 +123,13 @@ def _planned(target: str, maps: tuple[str, ...]) -> Iterator[tuple[type, CheckPl
         yield system, plan_for(map=name)
 
 
-def _planned_for_tests(target: str, maps: tuple[str, ...]) -> Iterator[tuple[type, CheckPlan]]:
+def _planned_for_tests(target: str, maps: tuple[str, ...]) -> Iterator[tuple[AnySystem, CheckPlan]]:
     """Yield what the tests in a file fly; several tests of one landing system fly it once."""
     from pytest_garl.plugin.tests_of_file import targets_of
     from pytest_garl.scenarios.maps.loading import load_map
     from pytest_garl.testing import CheckPlan
 
-    flown: list[tuple[type, CheckPlan]] = []
+    flown: list[tuple[AnySystem, CheckPlan]] = []
     for found, folders in targets_of(target):
         if maps and found.map not in maps:
             continue
@@ -149,14 +150,14 @@ def _planned_for_tests(target: str, maps: tuple[str, ...]) -> Iterator[tuple[typ
     yield from flown
 
 
-def imported_system(name: str) -> type:
-    """Return a landing system's class, imported as from the current folder."""
+def imported_system(name: str) -> AnySystem:
+    """Return a landing system, a class or a program, imported as from the current folder."""
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
     from pytest_garl.execution.reference import system_named
 
     try:
-        system: type = system_named(name)
+        system: AnySystem = system_named(name)
     except LandingSystemError as error:
         python = python_that_lacks(str(error))
         raise LandingSystemError(

@@ -17,6 +17,7 @@ from typing import Any
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution.sources import code_sha256, flight_code_sha256
 from pytest_garl.messages import shown
+from pytest_garl.program import ProgramSystem, program_named
 
 SYSTEM_NAME = re.compile(r"\w[\w-]*(\.\w[\w-]*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 """Form of "module:class", names with dots between, so that no path can be imported."""
@@ -24,18 +25,22 @@ SYSTEM_NAME = re.compile(r"\w[\w-]*(\.\w[\w-]*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 HASHED = (
     "airframe.py",
     "commands.py",
+    "companion",
     "cpu_dispatch.py",
     "distortion.py",
     "execution",
+    "external",
     "fiducial.py",
     "files",
     "flight",
     "foreign_text.py",
     "landing_system.py",
     "npcs",
+    "program.py",
     "scenarios",
     "search",
     "simulation",
+    "vehicle",
     "verdicts",
 )
 """Folders and modules of this package that shape a search: its hash covers them."""
@@ -81,7 +86,8 @@ class Reference:
             module = importlib.util.module_from_spec(spec)
             sys.modules[self.module] = module
             spec.loader.exec_module(module)
-        return operator.attrgetter(self.qualname)(module)
+        program = program_named(self.module, self.qualname)
+        return program or operator.attrgetter(self.qualname)(module)
 
 
 BUILT_IN = Reference(module="pytest_garl.simulation.fly", file="", qualname="fly")
@@ -89,10 +95,15 @@ BUILT_IN = Reference(module="pytest_garl.simulation.fly", file="", qualname="fly
 
 
 def reference_to(definition: Any) -> Reference:
-    """Return a class's or function's reference.
+    """Return the reference of a class, a function or a program.
 
     Raises LandingSystemError if no worker can import it.
     """
+    if isinstance(definition, ProgramSystem):
+        definition.check_place()
+        return Reference(
+            module=definition.__module__, file=definition.module_file, qualname=definition.name
+        )
     qualname = getattr(definition, "__qualname__", "")
     if not qualname or "<locals>" in qualname or "<lambda>" in qualname:
         raise LandingSystemError(
@@ -138,7 +149,8 @@ def system_named(name: str) -> Any:
         )
     module, _, qualname = name.partition(":")
     try:
-        found: Any = operator.attrgetter(qualname)(importlib.import_module(module))
+        loaded = importlib.import_module(module)
+        found: Any = program_named(module, qualname) or operator.attrgetter(qualname)(loaded)
     except (Exception, SystemExit) as error:
         # A module may raise anything while it is imported.
         raise LandingSystemError(f"{type(error).__name__}: {error}") from error
@@ -147,7 +159,11 @@ def system_named(name: str) -> Any:
 
 
 def check_system(system: Any) -> None:
-    """Raise LandingSystemError if a class cannot be a landing system."""
+    """Raise LandingSystemError if a class or a program cannot be a landing system."""
+    if isinstance(system, ProgramSystem):
+        system.check_place()
+        system.check()
+        return
     if isinstance(system, str) and SYSTEM_NAME.fullmatch(system):
         module, _, name = system.partition(":")
         first = name.partition(".")[0]
@@ -157,7 +173,8 @@ def check_system(system: Any) -> None:
         )
     if not inspect.isclass(system):
         raise LandingSystemError(
-            f"system={system!r}: expected a class, found {type(system).__name__}"
+            f"system={system!r}: expected a class or a program such as CompanionProgram(...), "
+            f"found {type(system).__name__}"
         )
     for method in ("reset", "step"):
         if not callable(getattr(system, method, None)):

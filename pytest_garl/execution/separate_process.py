@@ -18,10 +18,11 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError, LandingSystemError
 from pytest_garl.execution.processes import end_with_parent, ignore_ctrl_c
 from pytest_garl.execution.reference import Reference, reference_to
+from pytest_garl.program import AnySystem
 
 
 def call_in_separate_process(
-    function: str, system: type, options: Mapping[str, Any]
+    function: str, system: AnySystem, options: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return the JSON values that "module:function" returns for a class and JSON options.
 

@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import LandingSystemError
+from pytest_garl.program import ProgramSystem
 
 _HOME = Path(__file__).resolve().parents[1]
 """The folder of pytest_garl."""
@@ -39,6 +40,8 @@ ROOTS = (
 """What flies a case, what moves its objects, and what judges it."""
 NOT_FLOWN = frozenset({"pytest_garl", "pytest_garl.errors", "pytest_garl.messages"})
 """Modules that they import, and that decide nothing: the version, texts, and types of errors."""
+_STACK_ROOMS = ("companion", "external", "program.py", "vehicle")
+"""What ships here and is part of the landing system that uses it."""
 _DATA_ROOMS = ("simulation", "verdicts")
 """Folders whose other files are read in a flight, such as meshes; maps have a hash of their own."""
 _FIELDS_WITHOUT_MEANING = frozenset({"ctx", "kind", "type_comment", "type_ignores"})
@@ -60,13 +63,20 @@ def combined_sha256(sources: Iterable[tuple[str, str]]) -> str:
 def source_hashes(
     definition: Any, files: Mapping[str, Path] | None = None
 ) -> tuple[tuple[str, str], ...]:
-    """Return the sources of a class or function: names of files with their hashes.
+    """Return the sources of a class, a function or a program: names of files with their hashes.
 
     The name of a module's file is relative to the folder from which it is imported.
     """
     found = {module.source_name: module.file for module in _modules(definition)}
     found.update(files or {})
-    return tuple(sorted((name, _sha256(file)) for name, file in found.items()))
+    hashes = {name: _sha256(file) for name, file in found.items()}
+    if isinstance(definition, ProgramSystem):
+        hashes.update(definition.source_hashes())
+        # Its room holds code too that only the program's own process imports.
+        room = Path(inspect.getfile(type(definition))).resolve().parent
+        if room.is_relative_to(_HOME):
+            hashes |= {_name(file, _HOME.parent): _sha256(file) for file in room.rglob("*.py")}
+    return tuple(sorted(hashes.items()))
 
 
 def data_files(paths: Sequence[str], root: Path) -> dict[str, Path]:
@@ -141,7 +151,12 @@ def _modules(definition: Any) -> list[_Module]:
 
 
 def _defining(definition: Any) -> _Module | None:
-    """Return the module of a class or function, however it was loaded."""
+    """Return the module of a class or function, however it was loaded.
+
+    Of a program it is that of its own class, since the tests beside it are no part of it.
+    """
+    if isinstance(definition, ProgramSystem):
+        definition = type(definition)
     try:
         file = Path(inspect.getfile(definition)).resolve()
     except (TypeError, OSError):
@@ -240,7 +255,12 @@ def _spec(name: str) -> Any:
 
 
 def _belongs_to_project(file: Path) -> bool:
-    """Whether a file is the user's own: not Python's, not installed, not part of pytest_garl."""
+    """Whether a file is part of a landing stack: not Python's and not installed.
+
+    Of pytest_garl these are the vehicles, and what carries a program.
+    """
+    if any(file.is_relative_to(_HOME / room) for room in _STACK_ROOMS):
+        return True
     installed = {"site-packages", "dist-packages"}
     return not installed & {*file.parts} and not any(
         file.is_relative_to(folder) for folder in _folders_outside_project()

@@ -20,6 +20,7 @@ from pytest_garl.npcs.policy_catalogue import policy_names, policy_spec
 from pytest_garl.npcs.policy_check import check_policy
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
+from pytest_garl.program import AnySystem
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.own_navigation import within
 from pytest_garl.scenarios.files import load
@@ -57,7 +58,7 @@ class Searches:
         slots = (slot for slot in wanted if slot < target.slot and (not above or slot > above))
         return [wanted[slot] for slot in sorted(slots)]
 
-    def register(self, system: type, npcs: PolicySpec | None) -> None:
+    def register(self, system: AnySystem, npcs: PolicySpec | None) -> None:
         """Put all searches of a landing system into the ledger.
 
         Without a policy the NPCs of each search move as its domain says.

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from pytest_garl.cases.corpus import CorpusEntry
     from pytest_garl.execution.stored_ledger import StoredFlight, StoredSlot
     from pytest_garl.landing_system import Airframe, NavigationKind
+    from pytest_garl.program import AnySystem
     from pytest_garl.scenarios.domains.domain import Domain
     from pytest_garl.verdicts.verdict import Limits
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 class Target:
     """A landing system on a map, and the flight that an item judges."""
 
-    system: type
+    system: AnySystem
     limits: Limits
     map: str = ""
     """Empty for a saved case whose file cannot be read."""

@@ -13,11 +13,13 @@ from pytest_garl.foreign_text import (
     MESSAGE_CHARS,
     TRACEBACK_CHARS,
     class_name,
+    cut,
     cut_middle,
     identifier_from,
     text_from,
 )
 from pytest_garl.landing_system import Airframe, airframe_of
+from pytest_garl.program import ProgramFailedError, ProgramSystem
 from pytest_garl.simulation.system_under_test.reading import NonsenseError
 
 _SIMULATION = Path(__file__).parents[1]
@@ -110,10 +112,18 @@ def read_airframe(system: object) -> Airframe:
 
 
 def crash_of(error: BaseException, method: str) -> Crash:
-    """Return the record of an exception from one of a landing system's methods.
+    """Return the record of an exception from one of a landing system's methods, or of a program.
 
     A message is cut after 1,000 characters, a traceback in the middle, to 20,000.
     """
+    if isinstance(error, ProgramFailedError):
+        return Crash(
+            kind="raised",
+            error=identifier_from(error.error),
+            message=cut(error.message, MESSAGE_CHARS),
+            where=identifier_from(error.where),
+            traceback=cut_middle(error.trace, TRACEBACK_CHARS),
+        )
     kind = class_name(type(error))
     try:
         frames = traceback.extract_tb(error.__traceback__)
@@ -139,4 +149,6 @@ def crash_of(error: BaseException, method: str) -> Crash:
 
 
 def _system_name(system: Callable[[], Any]) -> str:
+    if isinstance(system, ProgramSystem):
+        return system.name
     return class_name(system) if isinstance(system, type) else "system"

@@ -1,0 +1,1 @@
+"""Python programs that fly unchanged, in the time of the flight."""

@@ -1,0 +1,1 @@
+"""Programs of any language that fly in lock-step with the simulator."""

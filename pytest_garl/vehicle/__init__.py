@@ -1,0 +1,1 @@
+"""The autopilot that ships: what a companion program commands by its messages."""
