@@ -8,7 +8,6 @@ import math
 from collections import deque
 from collections.abc import Callable
 
-from landing_systems.modules.control_ardupilot import ArduPilotControl, tuned, vehicle_of
 from landing_systems.modules.decision import Decision, DecisionModule, DecisionParameters
 from landing_systems.modules.detection_tphyolo.detector import TphYoloDetector
 from landing_systems.modules.movement_watch import MovementWatch
@@ -25,6 +24,7 @@ from pytest_garl import (
     PositionSetpoint,
     VehicleState,
 )
+from pytest_garl.vehicle import ArduPilotControl, tuned, vehicle_of
 
 AIRFRAME = Airframe(control_rate_hz=240)
 PARAMETERS = dataclasses.replace(

@@ -51,6 +51,12 @@ KEPT_APART = {
     "search/user_method": "every pytest run loads the catalogue, and few name such a method",
     "simulation/physics/leap": "one way to move; npc chooses among them",
     "simulation/physics/solids_ahead": "geometry of maps, which knows no NPC",
+    "vehicle/attitude": "a loop of the cascade has a file of its own",
+    "vehicle/guidance": "a mode has a file of its own",
+    "vehicle/land_mode": "a mode has a file of its own",
+    "vehicle/rate_control": "a loop of the cascade has a file of its own",
+    "vehicle/sink_rate": "formulae of LAND, which know no state",
+    "vehicle/spool": "a state machine of its own in ArduPilot too",
 }
 """Short files with one importer, in the importer's room, and why they are no part of it."""
 

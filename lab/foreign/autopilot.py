@@ -1,7 +1,7 @@
 """The part of ArduPilot Copter that the foreign systems talk to.
 
 It flies the motors with this project's reproduction of ArduPilot's flight control
-(``landing_systems/modules/control_ardupilot``): GUIDED flies to a position and holds it, LAND stops
+(``pytest_garl/vehicle``): GUIDED flies to a position and holds it, LAND stops
 and comes straight down, with precision landing on the target that LANDING_TARGET messages tell.
 """
 
@@ -16,13 +16,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from lab.foreign.repository import ForeignCodeError
-from landing_systems.modules.control_ardupilot import (
-    ArduPilotControl,
-    ArduPilotParameters,
-    tuned,
-    vehicle_of,
-)
-from landing_systems.modules.control_ardupilot.rotations import yaw_of
 from landing_systems.modules.detection_opencv import rotation_matrix
 from pytest_garl import (
     Airframe,
@@ -36,6 +29,13 @@ from pytest_garl import (
     PositionSetpoint,
     VehicleState,
 )
+from pytest_garl.vehicle import (
+    ArduPilotControl,
+    ArduPilotParameters,
+    tuned,
+    vehicle_of,
+)
+from pytest_garl.vehicle.rotations import yaw_of
 
 CONTROL_RATE_HZ = 240.0
 BODY_ABOVE_FEET_M = 0.2

@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_systems.modules.control_ardupilot import ArduPilotControl, ArduPilotParameters
 from pytest_garl import Airframe, VehicleState
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.simulation.physics.vehicle import (
@@ -20,6 +19,7 @@ from pytest_garl.simulation.physics.vehicle import (
     wrench,
 )
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
+from pytest_garl.vehicle import ArduPilotControl, ArduPilotParameters
 
 Orders = Callable[[float, ArduPilotControl], None]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from landing_systems.modules.control_ardupilot.filters import smoothing
-from landing_systems.modules.control_ardupilot.rotations import Vector
+from pytest_garl.vehicle.filters import smoothing
+from pytest_garl.vehicle.rotations import Vector
 
 LAND_AFTER_S = 1.0
 MAYBE_AFTER_S = 0.2

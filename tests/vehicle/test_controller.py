@@ -4,13 +4,13 @@ import itertools
 
 import pytest
 
-from landing_systems.modules.control_ardupilot import (
+from pytest_garl import Airframe, VehicleState
+from pytest_garl.vehicle import (
     ArduPilotControl,
     ArduPilotParameters,
     tuned,
     vehicle_of,
 )
-from pytest_garl import Airframe, VehicleState
 
 DT = 1 / 240
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from landing_systems.modules.control_ardupilot.mixer import MotorLimits
-from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters, RatePid
-from landing_systems.modules.control_ardupilot.pid import Pid
-from landing_systems.modules.control_ardupilot.rotations import Vector
-from landing_systems.modules.control_ardupilot.shaping import clamped
+from pytest_garl.vehicle.mixer import MotorLimits
+from pytest_garl.vehicle.parameters import ArduPilotParameters, RatePid
+from pytest_garl.vehicle.pid import Pid
+from pytest_garl.vehicle.rotations import Vector
+from pytest_garl.vehicle.shaping import clamped
 
 
 class RateControl:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from landing_systems.modules.control_ardupilot.filters import smoothing
+from pytest_garl.vehicle.filters import smoothing
 
 
 class Pid:

@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import pytest
 
-from landing_systems.modules.control_ardupilot import (
+from pytest_garl.vehicle import (
     ArduPilotParameters,
 )
-from landing_systems.modules.control_ardupilot.descent import (
+from pytest_garl.vehicle.guidance import ZERO, Setpoint
+from pytest_garl.vehicle.sink_rate import (
     descent_rate,
     descent_rate_over_target,
 )
-from landing_systems.modules.control_ardupilot.guidance import ZERO, Setpoint
-from landing_systems.modules.control_ardupilot.land_detector import LandDetector
+from pytest_garl.vehicle.touchdown_detector import LandDetector
 
 DT = 1 / 240
 P = ArduPilotParameters()

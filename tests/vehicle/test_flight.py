@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from landing_systems.modules.control_ardupilot import ArduPilotControl, tuned, vehicle_of
 from pytest_garl import (
     Airframe,
     Command,
@@ -28,6 +27,7 @@ from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.fly import fly
+from pytest_garl.vehicle import ArduPilotControl, tuned, vehicle_of
 from tests.support.bare_flight import Trace, fly_bare
 
 pytestmark = pytest.mark.sim

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters
-from landing_systems.modules.control_ardupilot.shaping import clamped, sqrt_controller
+from pytest_garl.vehicle.parameters import ArduPilotParameters
+from pytest_garl.vehicle.shaping import clamped, sqrt_controller
 
 SLOW_BELOW_M = 2.0
 SLOW_ABOVE_M = 0.35

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from landing_systems.modules.control_ardupilot import (
+from pytest_garl.vehicle import (
     ArduPilotParameters,
 )
-from landing_systems.modules.control_ardupilot.shaping import (
+from pytest_garl.vehicle.shaping import (
     ShapedAxis,
     ShapedPlane,
     sqrt_controller,

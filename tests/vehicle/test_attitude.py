@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-from landing_systems.modules.control_ardupilot import (
+from pytest_garl.vehicle import (
     ArduPilotParameters,
 )
-from landing_systems.modules.control_ardupilot.attitude import AttitudeControl
-from landing_systems.modules.control_ardupilot.rotations import (
+from pytest_garl.vehicle.attitude import AttitudeControl
+from pytest_garl.vehicle.rotations import (
     heading_quaternion,
     rotate,
     rotation_between,

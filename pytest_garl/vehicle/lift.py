@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from landing_systems.modules.control_ardupilot.position import GRAVITY_MPS2
-from pytest_garl import Airframe
+from pytest_garl.airframe import Airframe
+from pytest_garl.vehicle.position import GRAVITY_MPS2
 
 REFERENCE_MASS_KG = 2.355
 REFERENCE_THRUST_N = 20.6

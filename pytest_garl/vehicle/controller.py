@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from landing_systems.modules.control_ardupilot.altitude import VerticalControl
-from landing_systems.modules.control_ardupilot.guidance import ZERO, Setpoint, follow
-from landing_systems.modules.control_ardupilot.land_detector import LandDetector
-from landing_systems.modules.control_ardupilot.land_mode import LandMode
-from landing_systems.modules.control_ardupilot.motor_output import MotorOutput
-from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters, tuned
-from landing_systems.modules.control_ardupilot.position import HorizontalControl
-from landing_systems.modules.control_ardupilot.precision_landing import PrecisionLanding
-from landing_systems.modules.control_ardupilot.rotations import Vector, yaw_of
-from landing_systems.modules.control_ardupilot.shaping import Pair
-from landing_systems.modules.control_ardupilot.spool import Spool
-from landing_systems.modules.control_ardupilot.vehicle import vehicle_of
-from pytest_garl import Airframe, MotorThrusts, VehicleState
+from pytest_garl.landing_system import Airframe, MotorThrusts, VehicleState
+from pytest_garl.vehicle.altitude import VerticalControl
+from pytest_garl.vehicle.guidance import ZERO, Setpoint, follow
+from pytest_garl.vehicle.land_mode import LandMode
+from pytest_garl.vehicle.lift import vehicle_of
+from pytest_garl.vehicle.motor_output import MotorOutput
+from pytest_garl.vehicle.parameters import ArduPilotParameters, tuned
+from pytest_garl.vehicle.position import HorizontalControl
+from pytest_garl.vehicle.precision_landing import PrecisionLanding
+from pytest_garl.vehicle.rotations import Vector, yaw_of
+from pytest_garl.vehicle.shaping import Pair
+from pytest_garl.vehicle.spool import Spool
+from pytest_garl.vehicle.touchdown_detector import LandDetector
 
 Mode = Literal["stopped", "take-off", "guided", "land"]
 

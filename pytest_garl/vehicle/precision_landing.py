@@ -13,10 +13,10 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from landing_systems.modules.control_ardupilot.landing_target import LandingTarget
-from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters
-from landing_systems.modules.control_ardupilot.rotations import Vector
-from landing_systems.modules.control_ardupilot.shaping import Pair
+from pytest_garl.vehicle.landing_target import LandingTarget
+from pytest_garl.vehicle.parameters import ArduPilotParameters
+from pytest_garl.vehicle.rotations import Vector
+from pytest_garl.vehicle.shaping import Pair
 
 Action = Literal["land on target", "descend", "retry", "hold"]
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from landing_systems.modules.control_ardupilot import ArduPilotParameters
-from landing_systems.modules.control_ardupilot.landing_target import (
+from pytest_garl.vehicle import ArduPilotParameters
+from pytest_garl.vehicle.landing_target import (
     AxisFilter,
     LandingTarget,
     measurement_variance,
 )
-from landing_systems.modules.control_ardupilot.precision_landing import (
+from pytest_garl.vehicle.precision_landing import (
     Instruction,
     PrecisionLanding,
 )

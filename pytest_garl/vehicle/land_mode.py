@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 
-from landing_systems.modules.control_ardupilot.altitude import VerticalControl
-from landing_systems.modules.control_ardupilot.descent import (
+from pytest_garl.landing_system import VehicleState
+from pytest_garl.vehicle.altitude import VerticalControl
+from pytest_garl.vehicle.parameters import ArduPilotParameters
+from pytest_garl.vehicle.position import HorizontalControl
+from pytest_garl.vehicle.precision_landing import PrecisionLanding
+from pytest_garl.vehicle.rotations import Vector
+from pytest_garl.vehicle.shaping import Pair
+from pytest_garl.vehicle.sink_rate import (
     descent_rate,
     descent_rate_over_target,
 )
-from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters
-from landing_systems.modules.control_ardupilot.position import HorizontalControl
-from landing_systems.modules.control_ardupilot.precision_landing import PrecisionLanding
-from landing_systems.modules.control_ardupilot.rotations import Vector
-from landing_systems.modules.control_ardupilot.shaping import Pair
-from pytest_garl import VehicleState
 
 
 class LandMode:

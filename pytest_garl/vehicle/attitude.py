@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters
-from landing_systems.modules.control_ardupilot.rotations import (
+from pytest_garl.vehicle.parameters import ArduPilotParameters
+from pytest_garl.vehicle.rotations import (
     Quaternion,
     Vector,
     heading_quaternion,
@@ -15,7 +15,7 @@ from landing_systems.modules.control_ardupilot.rotations import (
     tilt_and_turn,
     yaw_of,
 )
-from landing_systems.modules.control_ardupilot.shaping import clamped, sqrt_controller
+from pytest_garl.vehicle.shaping import clamped, sqrt_controller
 
 LARGE_TILT_ERROR_RAD = math.radians(30)
 """From here on ArduPilot gives the heading up in favour of the thrust's direction."""

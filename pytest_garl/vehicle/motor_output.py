@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 
-from landing_systems.modules.control_ardupilot.attitude import AttitudeControl
-from landing_systems.modules.control_ardupilot.land_detector import (
+from pytest_garl.landing_system import MotorThrusts, VehicleState
+from pytest_garl.vehicle.attitude import AttitudeControl
+from pytest_garl.vehicle.mixer import FREE, mixed
+from pytest_garl.vehicle.parameters import ArduPilotParameters
+from pytest_garl.vehicle.position import GRAVITY_MPS2
+from pytest_garl.vehicle.rate_control import RateControl
+from pytest_garl.vehicle.rotations import Quaternion
+from pytest_garl.vehicle.shaping import Pair, clamped
+from pytest_garl.vehicle.touchdown_detector import (
     MAX_TILT_ERROR_RAD,
     MAX_TILT_REQUEST_RAD,
 )
-from landing_systems.modules.control_ardupilot.mixer import FREE, mixed
-from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters
-from landing_systems.modules.control_ardupilot.position import GRAVITY_MPS2
-from landing_systems.modules.control_ardupilot.rates import RateControl
-from landing_systems.modules.control_ardupilot.rotations import Quaternion
-from landing_systems.modules.control_ardupilot.shaping import Pair, clamped
-from pytest_garl import MotorThrusts, VehicleState
 
 MIX_UP_PER_S = 2.0
 MIX_DOWN_PER_S = 0.5

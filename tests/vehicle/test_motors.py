@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from landing_systems.modules.control_ardupilot.mixer import Shares, mixed
-from landing_systems.modules.control_ardupilot.spool import Spool
+from pytest_garl.vehicle.mixer import Shares, mixed
+from pytest_garl.vehicle.spool import Spool
 
 
 def mix(roll: float, pitch: float, yaw: float, throttle: float, best: float = 0.5) -> Shares:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from landing_systems.modules.control_ardupilot.filters import smoothing
-from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters
-from landing_systems.modules.control_ardupilot.pid import Pid
-from landing_systems.modules.control_ardupilot.shaping import (
+from pytest_garl.vehicle.filters import smoothing
+from pytest_garl.vehicle.parameters import ArduPilotParameters
+from pytest_garl.vehicle.pid import Pid
+from pytest_garl.vehicle.shaping import (
     ShapedAxis,
     clamped,
     sqrt_controller,

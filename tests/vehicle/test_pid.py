@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from landing_systems.modules.control_ardupilot import (
+from pytest_garl.vehicle import (
     ArduPilotParameters,
 )
-from landing_systems.modules.control_ardupilot.filters import smoothing
-from landing_systems.modules.control_ardupilot.pid import Pid
-from landing_systems.modules.control_ardupilot.position import HorizontalControl
+from pytest_garl.vehicle.filters import smoothing
+from pytest_garl.vehicle.pid import Pid
+from pytest_garl.vehicle.position import HorizontalControl
 
 DT = 1 / 240
 P = ArduPilotParameters()

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from landing_systems.modules.control_ardupilot.altitude import VerticalControl
-from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters
-from landing_systems.modules.control_ardupilot.position import HorizontalControl
-from landing_systems.modules.control_ardupilot.rotations import Vector
-from landing_systems.modules.control_ardupilot.shaping import clamped
+from pytest_garl.vehicle.altitude import VerticalControl
+from pytest_garl.vehicle.parameters import ArduPilotParameters
+from pytest_garl.vehicle.position import HorizontalControl
+from pytest_garl.vehicle.rotations import Vector
+from pytest_garl.vehicle.shaping import clamped
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from landing_systems.modules.control_ardupilot.filters import smoothing
-from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters
-from landing_systems.modules.control_ardupilot.shaping import Pair, ShapedPlane, sqrt_controller
+from pytest_garl.vehicle.filters import smoothing
+from pytest_garl.vehicle.parameters import ArduPilotParameters
+from pytest_garl.vehicle.shaping import Pair, ShapedPlane, sqrt_controller
 
 GRAVITY_MPS2 = 9.80665
 """Standard gravity."""

@@ -7,8 +7,8 @@ of the image, so ``PLND_LAG``, ``PLND_CAM_POS_*`` and ``PLND_YAW_ALIGN`` have no
 
 from __future__ import annotations
 
-from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters
-from landing_systems.modules.control_ardupilot.shaping import Pair
+from pytest_garl.vehicle.parameters import ArduPilotParameters
+from pytest_garl.vehicle.shaping import Pair
 
 INITIAL_S = 2.0
 INITIAL_GAP_S = 0.5
