@@ -18,7 +18,6 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Camera
-from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.camera.projection import View
@@ -81,7 +80,7 @@ def main() -> None:
         )
     for path in paths:
         flight = load(path)
-        scenario = parse_scenario(next(iter(scenarios.values())))
+        scenario = next(iter(scenarios.values()))
         map = load_map(name)
         renderer = Renderer(Placed(scenario, map), Camera(), generator(scenario.seed, "sensor"))
         target = arguments.garl_dir / f"{path.stem}.png"

@@ -244,6 +244,14 @@ class Facts:
         key = _origins(search, generation)
         return [self._typed(Origin, key, each) for each in self._get(key) or ()]
 
+    def note_director(self, search: str, generation: int, director: str) -> None:
+        """Note the weights that decide in the flights of a generation when NPCs begin."""
+        self._first(_director(search, generation), director)
+
+    def director(self, search: str, generation: int) -> str:
+        """Return what decides in the flights of a generation; empty for the weights that ship."""
+        return self._text(_director(search, generation)) or ""
+
     def note_user_failures(self, failures: Iterable[FailedFlightAssertion]) -> None:
         """Note the failed assertions about users' own properties."""
         self._set(_USER_FAILURES, [dataclasses.asdict(each) for each in failures])
@@ -329,6 +337,10 @@ class Facts:
 
 def _origins(search: str, generation: int) -> str:
     return f"origins of {search} {generation}"
+
+
+def _director(search: str, generation: int) -> str:
+    return f"director of {search} {generation}"
 
 
 def _failure(key: str) -> str:

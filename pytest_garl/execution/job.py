@@ -90,6 +90,10 @@ class FlightJob:
         """Return the map of its flights."""
         return load_map(self.map, tuple(Path(folder) for folder in self.map_folders))
 
+    def directed_by(self, director: str) -> FlightJob:
+        """Return the job with another director of its NPCs, if their policy has one."""
+        return dataclasses.replace(self, npcs=self.npcs.directed_by(director))
+
     def differences(self, other: FlightJob) -> tuple[str, ...]:
         """Return the names of the facts that make results of ``other`` not comparable."""
         mine, theirs = dataclasses.asdict(self), dataclasses.asdict(other)

@@ -64,12 +64,17 @@ class LedgerFlight:
     @property
     def repeatable(self) -> Scenario:
         """The scenario, with what was decided in the flight as its own: it needs no director."""
-        return parse_scenario(self.scenario).replace(dict(self.result.decided))
+        return repeatable(self.scenario, self.result)
 
     def completed(self, folder: Path) -> CompletedFlight:
         """Return the flight with its record, which is in a folder of flights."""
         record = self.id.record(folder)
         return CompletedFlight(result=self.result, sha256=self.sha256, record=record)
+
+
+def repeatable(scenario: str, result: FlightResult | None) -> Scenario:
+    """Return a scenario in text with what was decided in its flight: it needs no director."""
+    return parse_scenario(scenario).replace(dict(result.decided) if result else {})
 
 
 class LedgerQueries:
@@ -180,14 +185,17 @@ class LedgerQueries:
             for search, map, generation, index, system, scenario, result, sha256 in rows
         ]
 
-    def scenarios(self, generation: int, slot: int, map: str) -> dict[str, str]:
-        """Return the scenario of a slot in each search."""
+    def scenarios(self, generation: int, slot: int, map: str) -> dict[str, Scenario]:
+        """Return the scenario of a slot in each search, repeatable if it was flown."""
         rows = self._database.execute(
-            "SELECT search.id, scenario FROM slot JOIN search ON search.id = slot.search "
+            "SELECT search.id, scenario, result FROM slot JOIN search ON search.id = slot.search "
             "WHERE kind = 'search' AND map = ? AND generation = ? AND slot = ? ORDER BY search.id",
             (map, generation, slot),
         )
-        return dict(rows.fetchall())
+        return {
+            search: repeatable(text, parse_result(result) if result else None)
+            for search, text, result in rows.fetchall()
+        }
 
     def nearest(self) -> dict[str, tuple[float, str]]:
         """Return each property's smallest decided margin so far, with its unit."""

@@ -10,7 +10,9 @@ from pathlib import Path
 from time import monotonic
 
 from pytest_garl.execution.database import Database
+from pytest_garl.execution.facts import Facts
 from pytest_garl.execution.flight_id import FlightId, Slot
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.processes import alive
 from pytest_garl.execution.result import FlightResult
 
@@ -102,10 +104,11 @@ class WorkQueue:
             job, map = self._database.execute(
                 "SELECT job, map FROM search WHERE id = ?", row[:1]
             ).fetchone()
+        director = Facts(self._database, self.path).director(row[0], row[1])
         return Claim(
             flight=FlightId(search=row[0], map=map, slot=Slot(generation=row[1], index=row[2])),
             scenario=row[3],
-            job=job,
+            job=parse_job(job).directed_by(director).dumps() if director else job,
             earlier_exits=row[4],
             attempt=row[5] + 1,
             pid=self._pid,

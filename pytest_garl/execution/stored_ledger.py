@@ -87,9 +87,9 @@ def read_slot(path: Path, map: str, slot: Slot) -> StoredSlot:
             search: StoredFlight(
                 system=jobs[search].system.name,
                 npcs=jobs[search].npcs.name,
-                scenario=parse_scenario(text),
+                scenario=scenario,
             )
-            for search, text in found.items()
+            for search, scenario in found.items()
         }
         return StoredSlot(map=map, slot=slot, flights=flights)
 

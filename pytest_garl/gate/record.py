@@ -25,7 +25,6 @@ from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
-from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -132,7 +131,7 @@ def baseline_from_ledger(path: Path) -> Baseline:
     sets = []
     for job, rows in searches:
         _check_npcs(path, job.npcs)
-        flights = [(parse_scenario(row.scenario), row.completed(Path(job.flights))) for row in rows]
+        flights = [(row.repeatable, row.completed(Path(job.flights))) for row in rows]
         if flights:
             sets.append(_baseline_set(job, flights, method))
     if not sets:

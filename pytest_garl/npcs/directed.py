@@ -8,8 +8,11 @@ import math
 
 import numpy as np
 
-from pytest_garl.npcs.director import Director, Watch
+from pytest_garl.errors import PolicyError
+from pytest_garl.messages import shown
+from pytest_garl.npcs.director import Director, TimeToGo, Watch
 from pytest_garl.npcs.interference import Interfering
+from pytest_garl.npcs.minds import Intercepting
 from pytest_garl.scenarios.story import story_of, waits_for_decision
 from pytest_garl.simulation.npc_policy import Move, Situation
 
@@ -17,10 +20,15 @@ from pytest_garl.simulation.npc_policy import Move, Situation
 class Directed(Interfering):
     """An interference whose begin is decided in flight, if its story waits for that.
 
-    From its begin on it moves as one whose story names that time.
+    From its begin on it moves as one whose story names that time.  ``director`` says who decides,
+    as :func:`director_of` reads it.
     """
 
     decides_begin = True
+
+    def __init__(self, grade: str, director: str = "") -> None:
+        super().__init__(grade, Intercepting())
+        self._director = director
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Read the story, or draw one."""
@@ -36,16 +44,39 @@ class Directed(Interfering):
         """Return the move until the next decision."""
         if self._watch is None:
             return super().decide(situation)
-        if math.isinf(self._began_s) and shipped_director().decides(self._watch.look(situation)):
+        if math.isinf(self._began_s) and director_of(self._director).decides(
+            self._watch.look(situation)
+        ):
             self._began_s = situation.time_s
         known = (*situation.moments_s[:-1], self._began_s)
         move = super().decide(dataclasses.replace(situation, moments_s=known))
         return dataclasses.replace(move, begins=math.isfinite(self._began_s))
 
 
-@functools.cache
-def shipped_director() -> Director:
-    """Return the director with the weights that ship."""
-    from pytest_garl.npcs.learned import learned_director
+TIME_TO_GO = "time-to-go"
+"""The first word of a text that names the rule in place of a network."""
 
-    return learned_director()
+
+@functools.lru_cache(maxsize=64)
+def director_of(text: str) -> Director:
+    """Return the director that a text names.
+
+    Empty: the weights that ship.  ``time-to-go 0.5 1``: that rule, with its margin and its time
+    after an unseen UAV passed 3 m.  Else the weights of a network, as ``Network.text`` gives them.
+    """
+    from pytest_garl.npcs.director import LearnedDirector
+    from pytest_garl.npcs.learned import learned_director, network_from
+
+    if not text:
+        return learned_director()
+    rule, *constants = text.split()
+    if rule != TIME_TO_GO:
+        return LearnedDirector(network=network_from(text))
+    try:
+        margin_s, unseen_s = map(float, constants)
+    except ValueError as error:
+        raise PolicyError(
+            f"NPC policy: found the director {shown(text)}; expected '{TIME_TO_GO} MARGIN_S "
+            "UNSEEN_S', two numbers"
+        ) from error
+    return TimeToGo(margin_s=margin_s, unseen_s=unseen_s)

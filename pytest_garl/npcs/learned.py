@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import functools
 import hashlib
 import io
+import itertools
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -57,6 +59,32 @@ class Network:
             signal = np.maximum(weight @ signal + bias, 0.0)
         weight, bias = self.layers[-1]
         return np.asarray(weight @ signal + bias, dtype=np.float64)
+
+    @property
+    def text(self) -> str:
+        """The sizes of its layers and all weights in single precision, for :func:`network_from`."""
+        sizes = [len(self.layers[0][0][0]), *(len(bias) for _, bias in self.layers)]
+        parts = [part.astype("<f4").tobytes() for layer in self.layers for part in layer]
+        return f"{','.join(map(str, sizes))}:{base64.b64encode(b''.join(parts)).decode()}"
+
+
+def network_from(text: str) -> Network:
+    """Return the network of a director from its text; raise PolicyError if it is none."""
+    try:
+        told, _, encoded = text.partition(":")
+        sizes = [int(size) for size in told.split(",")]
+        values = np.frombuffer(base64.b64decode(encoded, validate=True), "<f4").astype(np.float64)
+        layers, rest = [], values
+        for inputs, outputs in itertools.pairwise(sizes):
+            weight, bias, rest = np.split(rest, [inputs * outputs, (inputs + 1) * outputs])
+            layers.append((weight.reshape(outputs, inputs), bias))
+    except ValueError as error:
+        raise PolicyError(
+            f"NPC policy: found the director {shown(text)}; expected the sizes of its layers and "
+            f"its weights ({error})"
+        ) from error
+    _check(Path("the director of this search"), layers, WAITING)
+    return Network(state=WAITING, layers=tuple(layers))
 
 
 class LearnedPolicy:

@@ -28,7 +28,7 @@ from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.search_setup import Searches
 from pytest_garl.plugin.target import Target
-from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.scenarios.files import dump_scenario, parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
@@ -312,8 +312,9 @@ class Run:
         """Request that a flown slot is flown ``count`` times more, unless it was already."""
         job = self.ledger.job(target.search)
         assert job is not None
-        text = self.ledger.scenario(target.flight)
-        assert text is not None
+        # The ledger of a search that learns holds other weights than its job.
+        result = self.flight(target).result
+        text = dump_scenario(self.scenario(target).replace(dict(result.decided)))
         flights = [target.reflight(index) for index in range(count)]
         for flight in flights:
             self.ledger.add_flight(flight, target.system_name, job, text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import math
 from dataclasses import dataclass
@@ -175,6 +176,12 @@ class PolicySpec:
     def decides_begin(self) -> bool:
         """Whether it decides when an NPC begins whose story waits for that."""
         return bool(getattr(self._load(), "decides_begin", False))
+
+    def directed_by(self, director: str) -> PolicySpec:
+        """Return the policy with another director, if it decides when NPCs begin."""
+        if not director or not self.decides_begin:
+            return self
+        return dataclasses.replace(self, arguments=(("director", director),))
 
     def _load(self) -> Any:
         module, _, attribute = self.factory.partition(":")

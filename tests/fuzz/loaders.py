@@ -239,8 +239,7 @@ def _use(ledger: Ledger) -> None:
     ledger.queries.result_hash()
     ledger.queries.meters()
     ledger.queries.seconds_per_flight()
-    for text in ledger.queries.scenarios(0, 1, "lawn").values():
-        parse_scenario(text)
+    ledger.queries.scenarios(0, 1, "lawn")
 
 
 def _rows() -> list[str]:

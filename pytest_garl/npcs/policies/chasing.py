@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pytest_garl.npcs.directed import Directed
-from pytest_garl.npcs.minds import Intercepting
 
 
 class Chasing(Directed):
@@ -11,8 +10,8 @@ class Chasing(Directed):
 
     grade = "chasing"
 
-    def __init__(self) -> None:
-        super().__init__(self.grade, Intercepting())
+    def __init__(self, director: str = "") -> None:
+        super().__init__(self.grade, director)
 
 
 POLICY = Chasing

@@ -15,6 +15,9 @@ class Graded:
     grade = ""
     decides_begin = True
 
+    def __init__(self, director: str = "") -> None:
+        self._director = director
+
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Make the policy of the grade; raise PolicyError if the scenario has no story."""
         from pytest_garl.npcs.policy_catalogue import policy_spec
@@ -26,7 +29,7 @@ class Graded:
                 f"NPC policy 'graded': the scenario says no grade for {name}; choose a domain "
                 f"whose npc_behaviour is one of {', '.join(GRADES)}, or --garl-npcs=GRADE"
             )
-        self._policy: NpcPolicy = policy_spec(story.grade).make()
+        self._policy: NpcPolicy = policy_spec(story.grade).directed_by(self._director).make()
         self._policy.reset(situation, rng)
 
     def decide(self, situation: Situation) -> Move:
