@@ -13,6 +13,7 @@ __version__ = "0.2.0.dev0"
 
 _HOMES = {
     "pytest_garl.airframe": ("Airframe", "Camera", "Rangefinder"),
+    "pytest_garl.external.external_program": ("ExternalProgram",),
     "pytest_garl.fiducial": ("MarkerSpec", "NestedMarker"),
     "pytest_garl.landing_system": (
         "Abort",

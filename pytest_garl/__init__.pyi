@@ -1,3 +1,4 @@
+from pytest_garl.external.external_program import ExternalProgram
 from pytest_garl.fiducial import MarkerSpec, NestedMarker
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import (
@@ -34,6 +35,7 @@ __all__ = [
     "Command",
     "Detection",
     "Diagnostics",
+    "ExternalProgram",
     "Flight",
     "Land",
     "Landing",

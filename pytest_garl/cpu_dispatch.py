@@ -78,6 +78,18 @@ def environment() -> dict[str, str]:
     }
 
 
+def environment_of_programs() -> dict[str, str]:
+    """Return what a program that flies gets: its own libraries may be of other versions.
+
+    NumPy passes over names of instructions that it does not know.
+    """
+    if not has_baseline():
+        return environment()
+    groups = {**_NUMPY_GROUPS_THEN, **_NUMPY_GROUPS}
+    known = " ".join(name for name, needed in groups.items() if _flags() >= needed)
+    return {**environment(), "NPY_DISABLE_CPU_FEATURES": known, "PYTHONHASHSEED": "0"}
+
+
 def was_started_for_flights() -> bool:
     """Whether this process was started with that environment; asked before ``pin``."""
     return environment().items() <= os.environ.items()

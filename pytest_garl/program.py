@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, Literal
 
 from pytest_garl.airframe import Airframe
 from pytest_garl.errors import LandingSystemError
@@ -138,12 +138,21 @@ class ProgramFailedError(Exception):
     """A program failed in a flight.
 
     ``error`` is the kind of it in a signature, ``where`` the place in the program, ``trace`` its
-    own traceback.
+    own traceback, ``kind`` that of the flight's ``Crash``.
     """
 
-    def __init__(self, error: str, message: str, *, where: str, trace: str = "") -> None:
+    def __init__(
+        self,
+        error: str,
+        message: str,
+        *,
+        where: str,
+        trace: str = "",
+        kind: Literal["raised", "nonsense", "died"] = "raised",
+    ) -> None:
         super().__init__(message)
         self.error, self.message, self.where, self.trace = error, message, where, trace
+        self.kind = kind
 
 
 AnySystem = type | ProgramSystem

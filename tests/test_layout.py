@@ -34,6 +34,8 @@ KEPT_APART = {
     "cli/case_tables": "what the commands about cases show, apart from what they do",
     "cli/film_command": "a command has a file of its own",
     "cli/skeleton": "`garl init` copies the file",
+    "external/axes": "formulae; the protocol says which values they turn",
+    "external/frame_memory": "what two processes share beside the lines of the protocol",
     "npcs/training/rewards": "formulae, named by their module where they are used",
     "plugin/hookspecs": "pluggy reads a module",
     "plugin/option_checks": "every pytest run loads the hooks, and few need the checks",

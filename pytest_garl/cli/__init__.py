@@ -19,6 +19,7 @@ COMMANDS = {
     "baseline": "baseline",
     "cases": "cases",
     "check": "check",
+    "client": "client",
     "diff": "baseline",
     "domain": "domain",
     "export": "export",

@@ -118,7 +118,7 @@ def crash_of(error: BaseException, method: str) -> Crash:
     """
     if isinstance(error, ProgramFailedError):
         return Crash(
-            kind="raised",
+            kind=error.kind,
             error=identifier_from(error.error),
             message=cut(error.message, MESSAGE_CHARS),
             where=identifier_from(error.where),
