@@ -8,7 +8,6 @@ take seconds.  ``python -m lab.ablations`` flies the searches that ``docs/ablati
 from __future__ import annotations
 
 import argparse
-import functools
 import itertools
 import json
 import os
@@ -21,15 +20,14 @@ from typing import Any
 import numpy as np
 from scipy.stats import t
 
+from lab.arms import arm_named
 from lab.stand_in import stand_in
 from lab.stand_in_way import ORDINARY, STURDY
 from lab.table import Key, ResultTable, Row, run_study
 from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.search.method import FlownScenario, Method, SearchPlan
-from pytest_garl.search.method_catalogue import find_method
-from pytest_garl.search.methods.garl import EXPLORING, Garl, GarlParameters
+from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.verdicts.kinds import hill_number
 
 MAPS = ("court", "lawn")
@@ -46,12 +44,8 @@ TABLE = ResultTable(
 )
 
 
-VARIANTS: dict[str, Callable[[SearchPlan], Method]] = {
-    "garl": find_method("garl"),
-    "exploring": functools.partial(Garl, parameters=EXPLORING),
-    "shuffled model": functools.partial(Garl, parameters=GarlParameters(shuffled=True)),
-    "random": find_method("random"),
-}
+VARIANTS = ("garl", "exploring+", "shuffled", "random")
+"""The arms that are flown; rows of an older commit have other names."""
 
 
 def search(key: Key, pool: Executor) -> dict[str, Any]:
@@ -65,7 +59,7 @@ def run_search(key: Key) -> dict[str, Any]:
     map = load_map(map_name)
     genome = genome_of(domain_named("field"), map)
     plan = SearchPlan(map=map, genome=genome, seed=int(seed), population=POPULATION)
-    method, found = VARIANTS[name](plan), list[str]()
+    method, found = arm_named(name).make(plan), list[str]()
     for _ in range(BUDGET // POPULATION):
         scenarios = method.ask()
         results = [stand_in(each, map, LANDINGS[landing]) for each in scenarios]
@@ -123,10 +117,8 @@ def _table(rows: list[Row]) -> str:
         f"| --- | ---: {'| ---: ' * len(cells)}|",
     ]
     of_garl = {(row["seed"], row["map"]): row for row in rows if row["variant"] == "garl"}
-    for variant in VARIANTS:
+    for variant in dict.fromkeys(row["variant"] for row in rows):
         own = [row for row in rows if row["variant"] == variant]
-        if not own:
-            continue
         texts = []
         for index, measure in enumerate(MEASURES.values()):
             values = [measure(row) for row in own]
@@ -152,7 +144,7 @@ def main() -> None:
     """Fly the missing searches, or print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", nargs="+", default=list(SEEDS))
-    parser.add_argument("--variants", nargs="+", default=list(VARIANTS))
+    parser.add_argument("--variants", nargs="+", default=list(VARIANTS), help="arms")
     parser.add_argument("--landings", nargs="+", default=list(LANDINGS))
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     run_study(parser, TABLE, report, fly_searches)

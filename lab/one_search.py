@@ -3,9 +3,10 @@
     python -m lab.one_search landing_systems.opencv_mls:OpenCvLandingSystem --map=court
         --seed=300 --arm=garl --flights=100 --until=^IV:person --out=flights.csv
 
-flies the domain `field` until a flight's signature matches ``--until``, a regular expression, or
-until all flights are flown.  The flights of a generation fly at once; a search has the same rows
-for any number of workers.  A search that is whole in the file is not flown again.
+flies the domain `field` with an arm of ``lab/arms.py`` until a flight's signature matches
+``--until``, a regular expression, or until all flights are flown.  The flights of a generation fly
+at once; a search has the same rows for any number of workers.  A search that is whole in the file
+is not flown again.
 """
 
 from __future__ import annotations
@@ -21,23 +22,22 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from lab.ablations import VARIANTS
+from lab.arms import ARMS, DOMAIN, FROZEN, arm_named
 from lab.table import ResultTable
 from pytest_garl import cpu_dispatch
+from pytest_garl.errors import GarlError
 from pytest_garl.execution.fly_and_judge import judged
-from pytest_garl.execution.reference import Reference
+from pytest_garl.execution.reference import SYSTEM_NAME, Reference
 from pytest_garl.execution.result import FlightResult, Origin
-from pytest_garl.npcs.domain_policy import policy_in
-from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY, policy_spec
-from pytest_garl.scenarios.domains.domain_file import domain_named
+from pytest_garl.plugin.options import population
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
-DOMAIN = domain_named("field")
 COLUMNS = (
     *("system", "map", "arm", "seed", "flight", "how", "parents"),
     *("signature", "no_landing", "elapsed_s", "is_last"),
@@ -62,26 +62,38 @@ class SearchTask:
         return self.system, self.map, self.arm, str(self.seed)
 
 
-def fly_one(system: str, scenario: Scenario) -> FlightResult:
+def system_named(name: str) -> Any:
+    """Return a landing system "module:Class"; raise GarlError if it cannot be imported."""
+    module, _, qualname = name.partition(":")
+    if not SYSTEM_NAME.fullmatch(name):
+        raise GarlError(f"landing system {name!r}: expected MODULE:CLASS")
+    try:
+        return Reference(module=module, file="", qualname=qualname).load()
+    except (ImportError, AttributeError, OSError) as error:
+        raise GarlError(f"landing system {name!r} cannot be imported: {error}") from error
+
+
+def fly_one(system: str, npcs: PolicySpec, scenario: Scenario) -> FlightResult:
     """Fly a landing system through a scenario; return the judged result."""
     import cv2
 
     cv2.setNumThreads(1)
-    module, _, name = system.partition(":")
-    landing_system = Reference(module=module, file="", qualname=name).load()
-    npcs = policy_spec(policy_in(DOMAIN, DEFAULT_POLICY))
-    flight = fly(scenario, landing_system, npcs, map=load_map(scenario.map))
+    flight = fly(scenario, system_named(system), npcs, map=load_map(scenario.map))
     return judged(flight, DEFAULT_LIMITS)
+
+
+def plan_of(map_name: str, seed: int, flights: int) -> SearchPlan:
+    """Return the plan of a search, with generations as large as those of pytest by default."""
+    map = load_map(map_name)
+    genome = genome_of(DOMAIN, map)
+    return SearchPlan(map=map, genome=genome, seed=seed, population=population(flights))
 
 
 def rows_of(
     task: SearchTask, fly_all: Callable[[Sequence[Scenario]], Iterator[FlightResult]]
 ) -> Iterator[dict[str, Any]]:
     """Yield the row of each flight, up to the first that matches."""
-    map = load_map(task.map)
-    size = max(2, min(20, task.flights // 10))
-    plan = SearchPlan(map=map, genome=genome_of(DOMAIN, map), seed=task.seed, population=size)
-    method, flown = VARIANTS[task.arm](plan), 0
+    method, flown = arm_named(task.arm).make(plan_of(task.map, task.seed, task.flights)), 0
     while flown < task.flights:
         scenarios = list(method.ask())
         origins = getattr(method, "origins", ()) or [Origin(how="control")] * len(scenarios)
@@ -115,7 +127,8 @@ def run(task: SearchTask, table: ResultTable, pool: Executor) -> None:
     if any(row["is_last"] == "1" for row in own):
         return
     known = {row["flight"] for row in own}
-    fly_all = functools.partial(pool.map, functools.partial(fly_one, task.system))
+    fly = functools.partial(fly_one, task.system, arm_named(task.arm).npcs)
+    fly_all = functools.partial(pool.map, fly)
     # A search that was interrupted is flown again, and its rows are the same.
     table.append(row for row in rows_of(task, fly_all) if str(row["flight"]) not in known)
 
@@ -127,7 +140,8 @@ def main() -> None:
     )
     parser.add_argument("system", metavar="MODULE:CLASS")
     parser.add_argument("--map", default="court")
-    parser.add_argument("--arm", choices=tuple(VARIANTS), default="garl")
+    arms = ", ".join(arm for arm in ARMS if arm != FROZEN)
+    parser.add_argument("--arm", default="garl", help=f"{arms}, rule@SECONDS; default garl")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--flights", type=int, default=100)
     parser.add_argument("--until", default="", help="regular expression; without it all are flown")
@@ -137,8 +151,15 @@ def main() -> None:
     table = ResultTable(file=named.pop("out"), columns=COLUMNS, key=(*COLUMNS[:4], "flight"))
     workers = named.pop("workers")
     cpu_dispatch.pin()
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        run(SearchTask(**named), table, pool)
+    try:
+        # Whoever cannot be flown is told before a process starts.
+        re.compile(named["until"])
+        system_named(named["system"])
+        load_map(named["map"])
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            run(SearchTask(**named), table, pool)
+    except (GarlError, re.error) as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":

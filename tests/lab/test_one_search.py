@@ -18,6 +18,7 @@ from lab.table import ResultTable
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.npc_policy import PolicySpec
 
 TASK = SearchTask(system="here:Stack", map="court", arm="garl", seed=301, flights=50)
 MAP = load_map("court")
@@ -36,7 +37,7 @@ def test_a_search_has_a_row_for_each_flight_and_children_name_their_parents() ->
     assert [row["flight"] for row in rows] == [*range(1, 51)]
     assert {row["how"] for row in rows} == {"control", "stratified", "bred"}
     bred = [row for row in rows if row["how"] == "bred"]
-    assert len(bred) >= (50 - 5) / 2
+    assert len(bred) >= (50 - 8) / 2
     assert all(len(row["parents"].split()) >= 2 for row in bred)
     assert [row["is_last"] for row in rows].index(1) == 49
 
@@ -50,7 +51,7 @@ def test_a_search_ends_at_the_first_flight_that_matches() -> None:
 
 
 def test_an_arm_without_children_has_none() -> None:
-    rows = rows_of(dataclasses.replace(TASK, arm="exploring"), fly_all)
+    rows = rows_of(dataclasses.replace(TASK, arm="exploring+"), fly_all)
     assert "bred" not in {row["how"] for row in rows}
 
 
@@ -59,7 +60,7 @@ def test_a_search_goes_on_where_its_table_ends(
 ) -> None:
     flown: list[Scenario] = []
 
-    def fly_one(system: str, scenario: Scenario) -> FlightResult:
+    def fly_one(system: str, npcs: PolicySpec, scenario: Scenario) -> FlightResult:
         flown.append(scenario)
         return arithmetic(scenario)
 
