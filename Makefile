@@ -1,18 +1,24 @@
-# Two commands for a fresh machine with Python 3.11 and make: `make search`, `make test`.
-PYTHON ?= python3.11
+# Two commands for a fresh machine with Python and make: `make search`, `make test`.
+# The first takes the newest Python that is supported and installed, the second 3.11 if it is there;
+# both take PYTHON if that is set, and an environment that is there as it is.
+SUPPORTED := 3.11 3.12 3.13
+runs = $(shell for python in $(1); do $$python -c 0 2>/dev/null && echo $$python && break; done)
+NEWEST = $(or $(PYTHON),$(call runs,python3.13 python3.12 python3.11),python3)
+TESTED = $(or $(PYTHON),$(call runs,$(SUPPORTED:%=python%)),python3)
 BUDGET ?= 20
 VENV := .venv
 BIN := $(VENV)/bin
 FLIES := $(VENV)/.flies
 READY := $(VENV)/.installed
 CLUSTERS := $(VENV)/.clusters
+OTHER := $(VENV)/.other
 CHECKS := $(VENV)/checks.log
 SMOKE := .garl/experiment-smoke
 
 # The tests start some thousand processes; without the compiled files each would parse the sources.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: search test test-long test-ray lint types layers tests bench faults experiment-smoke clean
+.PHONY: search test test-others test-other test-long test-ray lint types layers tests bench faults experiment-smoke clean
 .DEFAULT_GOAL := help
 
 help:  ## show the commands
@@ -45,6 +51,25 @@ layers: $(READY)
 tests: $(READY)
 	$(BIN)/pytest -n 2 --dist=worksteal -m "not ray and not long" --durations=15 tests landing_systems
 
+# PyTorch, which only training needs, is not installed there: its tests skip.
+test-others:  ## the fast tests and the saved cases on every other supported Python that is installed
+	@tested=$$($(TESTED) -c 'import sys; print("%d.%d" % sys.version_info[:2])'); found=; \
+	for version in $(SUPPORTED); do \
+	    test $$version != $$tested || continue; \
+	    for python in python$$version $(HOME)/.pyenv/versions/$$version.*/bin/python; do \
+	        $$python -c 0 2>/dev/null || continue; \
+	        found="$$found $$version"; \
+	        $(MAKE) --no-print-directory PYTHON=$$python VENV=.venvs/$$version test-other || exit; \
+	        break; \
+	    done; \
+	done; \
+	echo "Tested on:$${found:- no other Python: of $(SUPPORTED) only $$tested is installed}"
+
+test-other: $(OTHER)
+	$(BIN)/python --version
+	$(BIN)/pytest -n 2 --dist=worksteal -m "not sim and not ray and not long" tests
+	$(BIN)/pytest -n 2 --dist=worksteal -m long tests/landing_systems/test_saved_cases.py
+
 test-long: $(READY)  ## the tutorial, 50 kills, 154 misbehaving systems, more fuzz: an hour
 	$(BIN)/pytest -n 2 --dist=worksteal -m long tests
 
@@ -63,23 +88,31 @@ experiment-smoke: $(READY)  ## fly, measure and report an experiment at toy size
 	$(BIN)/python -m lab.experiment docs/experiments/smoke.toml --out=$(SMOKE) --folder=$(SMOKE)/runs
 	$(BIN)/python -m lab.experiment docs/experiments/smoke.toml --out=$(SMOKE) --report
 
-clean:  ## remove the virtual environment and the run folder
-	rm -rf $(VENV) .garl
+clean:  ## remove the virtual environments and the run folder
+	rm -rf $(VENV) .venvs .garl
 
 # Nothing is compiled that is never imported: pip would compile for half a minute.
+INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt
+ANEW = test "$$($(BIN)/python --version 2>&1)" = "$$($(TESTED) --version)" || $(TESTED) -m venv --clear $(VENV)
+
 # What flies needs neither PyTorch nor a linter.
 $(FLIES): pyproject.toml constraints.txt
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e .
+	test -d $(VENV) || $(NEWEST) -m venv $(VENV)
+	$(INSTALL) -e .
 	touch $@
 
 # Not after $(FLIES): pip installs all in one go.
 $(READY): pyproject.toml constraints.txt
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '.[dev,train]'
+	$(ANEW)
+	$(INSTALL) -e '.[dev,train]'
 	touch $(FLIES) $@
+
+$(OTHER): pyproject.toml constraints.txt
+	$(ANEW)
+	$(INSTALL) -e '.[dev]'
+	touch $@
 
 # Only the tests of clusters need Ray.
 $(CLUSTERS): $(READY)
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '.[dev,train,ray]'
+	$(INSTALL) -e '.[dev,train,ray]'
 	touch $@

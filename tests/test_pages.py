@@ -22,8 +22,8 @@ MOST_LINES = 15
 
 TRY = "cp -r docs/tutorial /tmp/my-stack && cd /tmp/my-stack && rm -r scenarios"
 RUN_BY = {
-    "python3.11 -m venv .venv && . .venv/bin/activate": ("Makefile", "$(FLIES)"),
-    "pip install -c constraints.txt .": ("Makefile", "-c constraints.txt -e ."),
+    "python3 -m venv .venv && . .venv/bin/activate": ("Makefile", "$(FLIES)"),
+    "pip install -c constraints.txt .": ("Makefile", "$(INSTALL) -e ."),
     'pip install -c constraints.txt "pytest-garl @ git+https://HOST/PATH.git@COMMIT"': (
         "tests/test_workflow.py",
         "Requirement",

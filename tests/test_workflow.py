@@ -105,12 +105,11 @@ def test_every_install_line_of_the_pages_names_extras_that_exist() -> None:
     assert [line for line in lines if re.search(r"pytest-garl(?!\[|.* @ )", line)] == []
 
 
-def test_pip_refuses_a_python_for_which_pybullet_has_no_wheel() -> None:
+def test_workflow_takes_a_python_that_is_supported() -> None:
     allowed = SpecifierSet(
         tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["requires-python"]
     )
-    assert "3.11.7" in allowed
-    assert "3.12.0" not in allowed
     setups = [step for job in JOBS.values() for step in job["steps"] if "setup-python" in str(step)]
+    assert setups
     for setup in setups:
         assert setup["with"]["python-version"] in allowed

@@ -177,7 +177,10 @@ class DecisionModule:
         near = [place for place in places if math.dist(place, latest) <= self._p.confirm_radius_m]
         if len(near) < self._p.confirm_count:
             return None
-        return sum(q[0] for q in near) / len(near), sum(q[1] for q in near) / len(near)
+        x = y = 0.0
+        for place in near:
+            x, y = x + place[0], y + place[1]
+        return x / len(near), y / len(near)
 
     def _look(self, time_s: float, position: tuple[float, float, float]) -> Decision:
         mission, p = self._mission, self._p

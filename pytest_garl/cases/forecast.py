@@ -107,5 +107,5 @@ def remaining_work(
                 free -= flights[request.name]
     # Flights of one kind follow each other; those of several kinds are flown side by side.
     each_s = [count * flight_s[name] for name, count in flights.items()]
-    seconds = max([sum(each_s) / max(1, workers), *each_s], default=0.0)
-    return RemainingWork(at_most=at_most, flights=sum(flights.values()), seconds=seconds)
+    seconds = max([math.fsum(each_s) / max(1, workers), *each_s], default=0.0)
+    return RemainingWork(at_most=at_most, flights=math.fsum(flights.values()), seconds=seconds)

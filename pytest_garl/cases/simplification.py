@@ -203,7 +203,8 @@ def complexity(scenario: Scenario, genome: Genome) -> Complexity:
             if item.key in present and not item.key.endswith(OBJECT_PLACES)
         ]
         off += any(share > 0 for share in shares)
-        distance += sum(shares)
+        for share in shares:
+            distance += share
     objects = sum(key.endswith(".velocity") for key in present)
     digits = sum(len(repr(value)) for value in present.values())
     return Complexity(strongest_grade(scenario), objects, off, round(distance, 2), digits)

@@ -117,6 +117,11 @@ class Database:
         """Close the file."""
         self._connection.close()
 
+    def __del__(self) -> None:
+        """Close the file of a ledger that an error left open: since 3.13 Python warns of it."""
+        with contextlib.suppress(AttributeError, sqlite3.Error):
+            self._connection.close()
+
     @contextmanager
     def transaction(self) -> Iterator[None]:
         """Hold the write lock over several statements."""

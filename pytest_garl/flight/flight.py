@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Literal
 
 from pytest_garl.airframe import Rangefinder
@@ -22,6 +23,18 @@ OBSERVED = ("image", "depth_m", "rangefinder_m")
 """The fields of an observation of which a flight records whether they were read."""
 PACKAGES = ("pytest-garl", "numpy", "opencv-python-headless", "pybullet")
 """Packages whose versions determine the bytes of a flight."""
+_SAME_ENGINE = {"pybullet": ("pybullet", "pybullet-arm64")}
+"""The engine is the first of these that is installed; for most machines one has no wheel."""
+
+
+def version_of(package: str) -> str:
+    """Return the version of an installed package, or "absent"."""
+    for name in _SAME_ENGINE.get(package, (package,)):
+        try:
+            return version(name)
+        except PackageNotFoundError:
+            continue
+    return "absent"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
-
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.fiducial import MarkerSpec
+from pytest_garl.flight.flight import version_of
 from pytest_garl.gate.baseline_file import Baseline, BaselineSet
 from pytest_garl.scenarios.task import Task
 from pytest_garl.verdicts.verdict import Limits
@@ -51,10 +50,7 @@ def environment_changes(base: Baseline) -> tuple[str, ...]:
     cpu = cpu_class_of_flights()
     changes = [] if base.cpu == cpu else [f"the CPU was {base.cpu}, is {cpu}"]
     for name, saved in base.versions:
-        try:
-            present = version(name)
-        except PackageNotFoundError:
-            present = "absent"
+        present = version_of(name)
         if saved != present:
             changes.append(f"{name} was {saved}, is {present}")
     return tuple(changes)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 
 from pytest_garl.errors import BaselineError, PolicyError
@@ -173,10 +172,10 @@ def _baseline_set(
 
 def _baseline(sets: Sequence[BaselineSet]) -> Baseline:
     from pytest_garl.cpu_dispatch import cpu_class_of_flights
-    from pytest_garl.flight.flight import PACKAGES
+    from pytest_garl.flight.flight import PACKAGES, version_of
 
     return Baseline(
         cpu=cpu_class_of_flights(),
-        versions=tuple((name, version(name)) for name in PACKAGES),
+        versions=tuple((name, version_of(name)) for name in PACKAGES),
         sets=tuple(sets),
     )

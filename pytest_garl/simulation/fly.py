@@ -6,11 +6,10 @@ import dataclasses
 import functools
 import time
 from collections.abc import Callable
-from importlib.metadata import version
 from typing import Any
 
 from pytest_garl.cpu_dispatch import dispatched
-from pytest_garl.flight.flight import PACKAGES, Flight
+from pytest_garl.flight.flight import PACKAGES, Flight, version_of
 from pytest_garl.flight.flight_file import hash_of
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.maps.loading import load_map
@@ -53,4 +52,4 @@ def fly(
 
 @functools.cache
 def _versions() -> tuple[tuple[str, str], ...]:
-    return tuple((name, version(name)) for name in PACKAGES)
+    return tuple((name, version_of(name)) for name in PACKAGES)

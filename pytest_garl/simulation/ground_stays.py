@@ -135,7 +135,8 @@ class GroundStays:
         if tilt_rad >= UPRIGHT_RAD:
             self._recorder.contact("ground", position, abs(velocity[2]), tilt_rad)
             return "collision"
-        still = math.sqrt(sum(value * value for value in velocity)) < STILL_MPS
+        vx, vy, vz = velocity
+        still = math.sqrt(vx * vx + vy * vy + vz * vz) < STILL_MPS
         if time_s - stopped_s < WATCHED_S or not still:
             return None
         self._recorder.event("landed", "at rest on the ground")

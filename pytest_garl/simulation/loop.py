@@ -155,7 +155,7 @@ class Loop:
         now = tick / PHYSICS_RATE_HZ
         self.recorder.time_s = now
         position, attitude, velocity, spin = self._world.uav_state()
-        if not math.isfinite(sum(position) + sum(attitude) + sum(velocity) + sum(spin)):
+        if not math.isfinite(math.hypot(*position, *attitude, *velocity, *spin)):
             raise self._system.not_finite_error(now)
         if tick % TICKS_PER_NPC_STEP == 0:
             self.moments.update(now, feet_height_m(position[2]))
@@ -172,8 +172,8 @@ class Loop:
         while self._pending and self._pending[0][0] <= tick:
             self._take(self._pending.pop(0)[1])
         self._actuate(tick, motion, estimate)
-        thrust_n = sum(self._thrusts)
-        return self._contacts.outcome(now, position, attitude, velocity, thrust_n)
+        fl, fr, rr, rl = self._thrusts
+        return self._contacts.outcome(now, position, attitude, velocity, fl + fr + rr + rl)
 
     def _actuate(self, tick: int, motion: Motion, estimate: Motion) -> None:
         """Apply the thrusts and the drag of this tick, and step the physics."""

@@ -51,7 +51,7 @@ def kinds_in_flights(counts: Sequence[int], flights: int, drawn: int) -> float:
     J. Plant Ecology 5(1), 3-21).  Raises ValueError if more are to be drawn than there are.
     """
     _check(counts, flights, drawn)
-    return float(sum(1 - _unseen(count, flights, drawn) for count in counts))
+    return math.fsum(1 - _unseen(count, flights, drawn) for count in counts)
 
 
 def kinds_in_a_draw(counts: Sequence[int], flights: int, drawn: int) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import shutil
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -140,7 +141,7 @@ def test_a_record_that_a_later_run_wrote_is_not_taken_for_the_flight(
 
 
 def test_a_slot_of_two_searches_is_named_by_its_search(run: Path) -> None:
-    with sqlite3.connect(run) as opened:
+    with closing(sqlite3.connect(run)) as opened, opened:
         opened.execute(
             "INSERT INTO search SELECT 'fedcba9876543210', 'other:Stack', map, wanted, job, kind "
             "FROM search"
@@ -158,7 +159,7 @@ def test_a_slot_of_two_searches_is_named_by_its_search(run: Path) -> None:
 
 def test_a_map_that_has_changed_since_the_flight_is_noted(run: Path) -> None:
     assert find(SLOT).notes == ()
-    with sqlite3.connect(run) as opened:
+    with closing(sqlite3.connect(run)) as opened, opened:
         opened.execute("UPDATE search SET job = replace(job, ?, ?)", (LAWN.sha256, "0" * 64))
     assert find(SLOT).notes == ("The map lawn has changed since the flight: pictures may differ.",)
 

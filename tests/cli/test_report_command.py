@@ -7,6 +7,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -162,8 +163,9 @@ def test_a_report_of_a_killed_run_holds_its_finished_flights(
     (tmp_path / "elsewhere").mkdir()
     path = tmp_path / "elsewhere" / "ledger.sqlite"
     with (
-        sqlite3.connect(searched / ".garl" / "ledger.sqlite") as before,
-        sqlite3.connect(path) as after,
+        closing(sqlite3.connect(searched / ".garl" / "ledger.sqlite")) as before,
+        closing(sqlite3.connect(path)) as after,
+        after,
     ):
         before.backup(after)
         # A kill leaves slots that are in flight, and no fact about the end.

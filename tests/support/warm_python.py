@@ -68,7 +68,7 @@ class WarmPopen(subprocess.Popen[Any]):
     _is_warm = False
 
     def _execute_child(self, *given: Any) -> None:
-        """Start the command; the names are those of ``subprocess`` in Python 3.11."""
+        """Start the command; the names are those of ``subprocess`` in Python 3.11 to 3.13."""
         args, executable, preexec_fn, _, pass_fds, cwd, env = given[:7]
         files, start_new_session = given[10:16], given[21]
         environment = dict(os.environ if env is None else env)
@@ -106,11 +106,19 @@ class WarmPopen(subprocess.Popen[Any]):
         return found
 
     def _internal_poll(self, *given: Any, **named: Any) -> int | None:
-        if self._is_warm:
-            named["_waitpid"] = self._server().status_of
-        poll: Any = super()
-        status: int | None = poll._internal_poll(*given, **named)
-        return status
+        ours: Any = self
+        if not self._is_warm:
+            poll: Any = super()
+            status: int | None = poll._internal_poll(*given, **named)
+            return status
+        if self.returncode is None and ours._waitpid_lock.acquire(blocking=False):
+            try:
+                pid, ended = self._server().status_of(self.pid, os.WNOHANG)
+                if pid and self.returncode is None:
+                    ours._handle_exitstatus(ended)
+            finally:
+                ours._waitpid_lock.release()
+        return self.returncode
 
     @classmethod
     def _server(cls) -> Server:

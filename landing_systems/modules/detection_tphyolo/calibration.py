@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -71,7 +72,8 @@ def reliability(
 def calibration_error(bins: Sequence[Bin]) -> float:
     """Return the expected calibration error: |confidence - share of right|, by count."""
     total = sum(each.count for each in bins)
-    return sum(each.count * abs(each.confidence - each.right) for each in bins) / max(1, total)
+    errors = (each.count * abs(each.confidence - each.right) for each in bins)
+    return math.fsum(errors) / max(1, total)
 
 
 def _sigmoid(x: Array) -> Array:

@@ -127,9 +127,10 @@ class _Objective:
         if self._reference is not None:
             leaving = costs.fitness(points, self._reference, p)
             terms.append((self._fitness_weight, leaving))
-        cost = sum(weight * value for weight, (value, _) in terms)
-        gradient = terms[0][0] * terms[0][1][1]
-        for weight, (_, slope) in terms[1:]:
+        weight, (value, slope) = terms[0]
+        cost, gradient = weight * value, weight * slope
+        for weight, (value, slope) in terms[1:]:
+            cost += weight * value
             gradient += weight * slope
         return cost, gradient
 

@@ -10,7 +10,6 @@ import re
 import shutil
 import tempfile
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from pytest_garl import cpu_dispatch
@@ -24,7 +23,7 @@ from pytest_garl.execution.reference import Reference, package_sha256
 from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.files.json_values import parse_json
-from pytest_garl.flight.flight import PACKAGES, Crash
+from pytest_garl.flight.flight import PACKAGES, Crash, version_of
 
 _PLACEHOLDER_RESULT = broken_result(Crash(kind="died", error="", message=""), diagonal_m=0.0)
 """The entry in the actor's own ledger for a flight whose worker ended; nothing reads it."""
@@ -169,13 +168,8 @@ class FlightActor:
 
 def versions() -> dict[str, str]:
     """Return the versions of all code that the bytes of a flight depend on."""
-    found = {
+    return {
         "sources of pytest-garl": package_sha256()[:12],
         "CPU dispatch": cpu_dispatch.expected(),
+        **{name: version_of(name) for name in PACKAGES},
     }
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "missing"
-    return found

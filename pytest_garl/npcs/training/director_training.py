@@ -13,12 +13,12 @@ import itertools
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pytest_garl.flight.flight import version_of
 from pytest_garl.npcs.director import WAITING, Director, LearnedDirector, TimeToGo
 from pytest_garl.npcs.gradient import (
     Decisions,
@@ -217,6 +217,6 @@ def _manifest(
         "sources": sources_sha256(),
         "versions": {
             "python": platform.python_version(),
-            **{name: version(name) for name in PACKAGES},
+            **{name: version_of(name) for name in PACKAGES},
         },
     }

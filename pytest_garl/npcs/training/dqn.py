@@ -138,7 +138,9 @@ class Experience:
 
     def _store_oldest(self, after: Array, terminated: bool) -> None:
         gamma = self._learner.training.discount
-        total = sum(gamma**index * reward for index, (_, _, reward) in enumerate(self._pending))
+        total = 0.0
+        for index, (_, _, reward) in enumerate(self._pending):
+            total += gamma**index * reward
         discount = 0.0 if terminated else gamma ** len(self._pending)
         state, action, _ = self._pending.popleft()
         self._learner.remember(state, action, total, after, discount)

@@ -8,12 +8,12 @@ import platform
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pytest_garl.flight.flight import version_of
 from pytest_garl.npcs.learned import Network, save
 from pytest_garl.npcs.training.checkpoint import identity_of, sources_sha256
 from pytest_garl.npcs.training.counterfactuals import COLLIDED, PREVENTABLE, WORTH
@@ -191,7 +191,7 @@ def _manifest(
         "sources": sources_sha256(),
         "versions": {
             "python": platform.python_version(),
-            **{name: version(name) for name in PACKAGES},
+            **{name: version_of(name) for name in PACKAGES},
         },
     }
 

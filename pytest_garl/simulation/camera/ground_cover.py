@@ -73,8 +73,8 @@ def _snow() -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
     # Power falls as the wave number to the exponent; the root of power is amplitude.
     spectrum = np.fft.rfft2(rng.standard_normal((size, size))) * wave ** (-_SNOW_SPECTRUM / 4)
     depth = np.fft.irfft2(spectrum, (size, size))
-    along = (np.roll(depth, -1, axis) - depth for axis in (0, 1))
-    slope = math.sqrt(sum(float((each**2).mean()) for each in along)) / (2 * _CELL_M)
+    along, across = (np.roll(depth, -1, axis) - depth for axis in (0, 1))
+    slope = math.sqrt((along**2).mean() + (across**2).mean()) / (2 * _CELL_M)
     depth *= _EDGE_SLOPE / slope
     padded = np.pad(depth.astype(np.float32), 2, mode="wrap")
     fine = cv2.resize(padded, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)[4:-4, 4:-4]

@@ -55,7 +55,7 @@ def are_floats(value: object, count: int) -> bool:
         type(value) is tuple
         and len(value) == count
         and all(type(item) is float for item in value)
-        and math.isfinite(sum(value))
+        and math.isfinite(math.hypot(*value))
     )
 
 

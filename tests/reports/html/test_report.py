@@ -8,6 +8,7 @@ import re
 import shutil
 import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -163,7 +164,7 @@ def test_a_run_without_violations_has_an_index_only(tmp_path: Path, video: Video
 
 
 def test_a_run_that_was_killed_is_reported_as_far_as_it_went(run: Path) -> None:
-    with sqlite3.connect(run / ".garl" / "ledger.sqlite") as ledger:
+    with closing(sqlite3.connect(run / ".garl" / "ledger.sqlite")) as ledger, ledger:
         ledger.execute("DELETE FROM run WHERE key = 'ended'")
         ledger.execute(
             "UPDATE slot SET state = 'claimed', result = NULL, sha256 = NULL WHERE slot = 2"
@@ -273,12 +274,12 @@ def broken_ledgers(run: Path) -> Iterator[tuple[Path, str]]:
     yield text, "file is not a database"
     old = run / "old.sqlite"
     shutil.copy(path, old)
-    with sqlite3.connect(old) as ledger:
+    with closing(sqlite3.connect(old)) as ledger, ledger:
         ledger.execute("UPDATE run SET value = '3' WHERE key = 'ledger'")
     yield old, "found a ledger of version 3, expected"
     damaged = run / "damaged.sqlite"
     shutil.copy(path, damaged)
-    with sqlite3.connect(damaged) as ledger:
+    with closing(sqlite3.connect(damaged)) as ledger, ledger:
         ledger.execute("UPDATE slot SET result = '{' WHERE slot = 1")
     yield damaged, "is damaged or no ledger of this version"
 
