@@ -19,6 +19,7 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import Database
 from pytest_garl.execution.result import Origin
 from pytest_garl.files.json_values import dataclass_from, parse_json
+from pytest_garl.npcs.director_progress import DirectorProgress
 
 T = TypeVar("T")
 _SESSION = "session "
@@ -252,6 +253,16 @@ class Facts:
         """Return what decides in the flights of a generation; empty for the weights that ship."""
         return self._text(_director(search, generation)) or ""
 
+    def note_progress(self, search: str, generation: int, progress: DirectorProgress) -> None:
+        """Note what a generation says of the director with which it was flown."""
+        self._first(_progress(search, generation), dataclasses.asdict(progress))
+
+    def progress(self, search: str, generation: int) -> DirectorProgress | None:
+        """Return what a generation says of its director; None if nothing learned from it."""
+        key = _progress(search, generation)
+        found = self._get(key)
+        return None if found is None else self._typed(DirectorProgress, key, found)
+
     def note_user_failures(self, failures: Iterable[FailedFlightAssertion]) -> None:
         """Note the failed assertions about users' own properties."""
         self._set(_USER_FAILURES, [dataclasses.asdict(each) for each in failures])
@@ -341,6 +352,10 @@ def _origins(search: str, generation: int) -> str:
 
 def _director(search: str, generation: int) -> str:
     return f"director of {search} {generation}"
+
+
+def _progress(search: str, generation: int) -> str:
+    return f"progress of the director of {search} {generation}"
 
 
 def _failure(key: str) -> str:

@@ -7,7 +7,6 @@ another flight, as far as the UAV did not see it.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.airframe import Airframe, Camera
-from pytest_garl.flight.flight import Flight, Track
+from pytest_garl.flight.flight import Track
 from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.npcs.director import Features, Watch
 from pytest_garl.npcs.grades import GRADE_LIMITS
@@ -44,6 +43,9 @@ asked about, each had an escape 1 s before the contact, and half of them none 0.
 WITHIN_S = 5.3
 """What the camera showed longer before a contact does not count
 (:data:`pytest_garl.cases.case.OBSERVED_WITHIN_S`)."""
+COLLISION_WORTH, PREVENTABLE_WORTH = 0.25, 1.0
+"""What a director's begin is worth.  A collision that nobody could have prevented shows little of a
+landing system, but it is on the way to one that somebody could."""
 TICKS_PER_NPC_STEP = 4
 """As in the flight's loop."""
 AFTERMATH_STEPS = 6
@@ -253,57 +255,3 @@ class Passage:
         body = [np.interp(uav.time_s, times, column) for column in np.array(way).T]
         shown = in_picture(uav, np.stack(body, axis=1), self._kind, self._camera)
         return first_seen_s(uav, shown)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Label:
-    """What a recorded flight tells of one moment: an NPC's numbers then, and what begin leads to.
-
-    ``meets`` is whether the NPC would have met the UAV, None if the UAV would have seen it before.
-    """
-
-    moment_s: float
-    features: Features
-    encounter: Encounter
-    meets: bool | None
-
-
-def labels_of(
-    flight: Flight,
-    scenario: Scenario,
-    map: Map,
-    name: str,
-    airframe: Airframe,
-    policy: Callable[[], Interfering],
-) -> tuple[Label, ...]:
-    """Return a label for each decision of a recorded flight at which an NPC could have begun.
-
-    ``map`` has the bodies that are present, ``policy`` makes what moves the NPC from its begin on.
-    Up to the first frame that shows the NPC of the recorded flight, its way is that of a flight in
-    which the NPC waits.  What happens after the motors stopped is no contact.
-    """
-    shown = (step.time_s for step in flight.steps if name in step.objects_visible)
-    known_s = next(shown, math.inf)
-    end_s = flight.elapsed_s
-    if flight.touchdown is not None and flight.touchdown.stopped_s is not None:
-        end_s = flight.touchdown.stopped_s
-    with Passage(flight.uav, scenario, map, name, airframe, policy) as passage:
-        rows = passage.waiting()
-        found = [
-            passage.begin_at(number * DECISION_STEP_S)
-            for number in range(len(rows))
-            if number * DECISION_STEP_S < min(known_s, end_s)
-        ]
-    labels = []
-    for row, each in zip(rows, found, strict=False):
-        contact_s = each.contact_s if each.contact_s is None or each.contact_s <= end_s else None
-        encounter = dataclasses.replace(each, contact_s=contact_s)
-        labels.append(
-            Label(
-                moment_s=each.moment_s,
-                features=row,
-                encounter=encounter,
-                meets=encounter.meets(known_s),
-            )
-        )
-    return tuple(labels)

@@ -178,7 +178,11 @@ class StoppingRate:
 
 
 def learned_when_to_go(
-    network: Network, things: Sequence[Stopping], rule: Array, settings: StoppingRate
+    network: Network,
+    things: Sequence[Stopping],
+    rule: Array,
+    settings: StoppingRate,
+    towards: Layers | None = None,
 ) -> Network:
     """Return the network after learning when to go.
 
@@ -186,9 +190,10 @@ def learned_when_to_go(
     known, so is the expected worth of each thing, J, and its gradient, without a sample:
     ∂J/∂(go - wait) = S p (1 - p) (worth of go - expected worth of waiting), where S is the
     probability that the thing still waits.  ``rule`` (n,) says for all decisions in a row whether a
-    rule goes: from there learning starts.
+    rule goes: from there learning starts.  Weights shrink towards 0, or ``towards`` other ones.
     """
     layers = network.layers
+    origin = towards or tuple((np.zeros_like(w), np.zeros_like(b)) for w, b in layers)
     adam = Adam(layers, settings.learning_rate)
     states = np.concatenate([each.states for each in things])
     table = _StoppingTable(things)
@@ -200,8 +205,10 @@ def learned_when_to_go(
         slope = (goes - rule) / len(rule) if imitates else table.slope(goes)
         gradient = _backwards(layers, signals, np.stack([-slope, slope], axis=1))
         gradient = tuple(
-            (of_weight + settings.shrinks * weight, of_bias)
-            for (of_weight, of_bias), (weight, _) in zip(gradient, layers, strict=True)
+            (of_weight + settings.shrinks * (weight - at), of_bias)
+            for (of_weight, of_bias), (weight, _), (at, _) in zip(
+                gradient, layers, origin, strict=True
+            )
         )
         layers = adam.step(layers, gradient)
     return Network(state=network.state, layers=layers)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -24,6 +25,8 @@ DRAWN_DELAY_S = 10.0
 """If the scenario has no story, an NPC comes at most so long after its phase."""
 DRAWN_REACH_M = 3.0
 """If the scenario has no story, a careless NPC crosses at most so far from the marker."""
+_MARGIN_M = 0.01
+"""A disc is looked at closely if it lies so much farther from a line than it reaches."""
 Vector = tuple[float, float, float]
 
 
@@ -52,6 +55,8 @@ class Perception:
     def __init__(self, limits: GradeLimits, map: Map) -> None:
         self._limits = limits
         self._discs = tuple(disc for body in map.bodies for disc in discs_of(body))
+        self._middles = np.array([(disc.x_m, disc.y_m) for disc in self._discs]).reshape(-1, 2).T
+        self._reaches = np.array([disc.radius_m for disc in self._discs]) + _MARGIN_M
         late = round(limits.delay_s / DECISION_STEP_S)
         self._seen: deque[tuple[Vector, Vector] | None] = deque(maxlen=late + 1)
 
@@ -76,7 +81,18 @@ class Perception:
         eye = (x, y, max(z, situation.self.top_m - 0.1))
         if math.dist(eye, situation.uav_position_m) > self._limits.sees_within_m:
             return False
-        return not any(_stands_between(disc, eye, situation.uav_position_m) for disc in self._discs)
+        thing = situation.uav_position_m
+        return not any(_stands_between(disc, eye, thing) for disc in self._near(eye, thing))
+
+    def _near(self, eye: Vector, thing: Vector) -> Sequence[Disc]:
+        """Return the discs that lie near the line between two points, seen from above."""
+        (x, y, _), (dx, dy, _) = eye, tuple(b - a for a, b in zip(eye, thing, strict=True))
+        ahead, aside = self._middles[0] - x, self._middles[1] - y
+        along = (ahead * dx + aside * dy) / max(dx * dx + dy * dy, 1e-12)
+        along = np.minimum(np.maximum(along, 0.0), 1.0)
+        ahead, aside = ahead - along * dx, aside - along * dy
+        near = ahead * ahead + aside * aside <= self._reaches * self._reaches
+        return [self._discs[number] for number in np.flatnonzero(near)]
 
 
 def _stands_between(disc: Disc, eye: Vector, thing: Vector) -> bool:

@@ -30,6 +30,7 @@ from pytest_garl.search.breeder import Breeder
 from pytest_garl.search.fixed import FixedScenarios
 from pytest_garl.search.method import Method, SearchPlan
 from pytest_garl.search.method_catalogue import make_method
+from pytest_garl.search.teaching import Lessons, Teacher
 from pytest_garl.simulation.npc_policy import PolicySpec
 
 
@@ -44,6 +45,8 @@ class Searches:
     """Targets of the selected items, by search and slot."""
     breeders: dict[str, Breeder] = field(default_factory=dict)
     """Breeders of the searches that the ledger has."""
+    teacher: Teacher = field(default_factory=Teacher)
+    """Trains the directors of the searches."""
 
     def select(self, target: Target) -> None:
         """Add the target of a selected item."""
@@ -140,7 +143,20 @@ class Searches:
                 f"{name} on {target.map}: two sets of tests fly the same search with different "
                 f"{', '.join(job.differences(parse_job(known)))}"
             )
-        self.breeders[search] = Breeder(self.ledger, search, method, slots)
+        self.breeders[search] = Breeder(
+            self.ledger, search, method, slots, self._lessons(search, target, job, method)
+        )
+
+    def _lessons(
+        self, search: str, target: Target, job: FlightJob, method: Method
+    ) -> Lessons | None:
+        """Return what trains the director of a search, None if nobody decides or learns."""
+        airframe = target.airframe
+        if not method.learns or airframe is None or job.simulator != BUILT_IN:
+            return None
+        if not job.npcs.decides_begin or dict(job.npcs.arguments):
+            return None
+        return Lessons(self.teacher, search, job, airframe)
 
     def _method(self, target: Target, wanted: Mapping[Slot, Target]) -> Method:
         if target.entry or self.options.repeat:

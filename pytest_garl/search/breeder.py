@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.scenarios.files import dump_scenario, parse_scenario
 from pytest_garl.search.method import FlownScenario, Method, TellsOrigins
+from pytest_garl.search.teaching import Lessons
 
 
 class Breeder:
     """Runs the method of one search; all pytest processes of a run compute the same scenarios.
 
     ``wanted`` has the slots to fly of each generation.  A method that learns needs all slots of
-    every generation but the last.
+    every generation but the last.  ``lessons`` train the director of the search, if it has one.
     """
 
     def __init__(
@@ -22,9 +23,11 @@ class Breeder:
         search: str,
         method: Method,
         wanted: Mapping[int, Sequence[int]],
+        lessons: Lessons | None = None,
     ) -> None:
         self._ledger, self._search, self._method = ledger, search, method
         self._wanted = dict(wanted)
+        self._lessons = lessons
         self._last_generation = max(wanted)
         self._next_generation = 0
         self._next_told = 0
@@ -41,6 +44,10 @@ class Breeder:
             if isinstance(self._method, TellsOrigins):
                 self._ledger.facts.note_origins(
                     self._search, self._next_generation, self._method.origins
+                )
+            if self._lessons is not None and self._lessons.director:
+                self._ledger.facts.note_director(
+                    self._search, self._next_generation, self._lessons.director
                 )
             texts = {slot: dump_scenario(scenarios[slot]) for slot in slots}
             self._ledger.add_slots(self._search, self._next_generation, texts)
@@ -62,11 +69,15 @@ class Breeder:
 
     def _learn(self) -> None:
         while self._next_told <= self._parents:
+            generation = self._ledger.generation(self._search, self._next_told)
             flown = [
                 FlownScenario(scenario=parse_scenario(text), result=result)
-                for text, result in self._ledger.generation(self._search, self._next_told)
+                for text, result in generation
                 if result is not None
             ]
             objectives = self._method.tell(flown)
             self._ledger.note_objectives(self._search, self._next_told, objectives)
+            if self._lessons is not None:
+                progress = self._lessons.learn(self._next_told, [text for text, _ in generation])
+                self._ledger.facts.note_progress(self._search, self._next_told, progress)
             self._next_told += 1

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pytest_garl import Airframe
-from pytest_garl.flight.flight import Flight, ObjectRecord, Step, Track
+from pytest_garl.flight.flight import Track
 from pytest_garl.npcs.encounter import (
     Encounter,
     Passage,
@@ -18,7 +18,6 @@ from pytest_garl.npcs.encounter import (
     could_be_prevented,
     first_seen_s,
     in_picture,
-    labels_of,
 )
 from pytest_garl.npcs.interference import Interfering
 from pytest_garl.npcs.minds import Intercepting
@@ -29,7 +28,6 @@ from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placed import Placed, start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, with_all_values
-from tests.verdicts.flights import flight
 
 LAWN = dataclasses.replace(load_map("lawn"), bodies=(), objects=(("person", 1),))
 PERSON = OBJECT_TYPES["person"]
@@ -137,57 +135,3 @@ def test_a_moment_is_a_begin_of_the_story() -> None:
     story = Placed(told, LAWN).npc("person-1").story
     assert story is not None
     assert story.begins_s((0.0, math.inf, math.inf, math.inf)) == 7.5
-
-
-def recorded(scenario: Scenario, shown_from_s: float = math.inf) -> Flight:
-    uav = descent(scenario)
-    person = ObjectRecord(name="person-1", type="person", track=uav, moves=np.zeros((0, 2)))
-    steps = tuple(
-        Step(
-            time_s=time_s,
-            command="Land",
-            marker_visible=1.0,
-            marker_px=50.0,
-            objects_visible=("person-1",) if time_s >= shown_from_s else (),
-            diagnostics=None,
-        )
-        for time_s in np.arange(0.0, 12.0, 0.1).tolist()
-    )
-    made = flight("landed", (0.0, 0.0, 0.2))
-    return dataclasses.replace(
-        made, uav=uav, objects=(person,), steps=steps, elapsed_s=12.0, touchdown=None
-    )
-
-
-def test_a_flight_labels_the_moments_up_to_where_it_saw_the_npc() -> None:
-    scenario = scenario_with(6.0)
-
-    def labels(shown_from_s: float = math.inf) -> list[bool | None]:
-        made = recorded(scenario, shown_from_s)
-        rows = labels_of(made, scenario, LAWN, "person-1", Airframe(), CHASING)
-        assert [row.moment_s for row in rows] == [0.5 * number for number in range(len(rows))]
-        return [row.meets for row in rows]
-
-    all_moments = labels()
-    assert len(all_moments) == 24
-    assert all_moments[-1] is False, "too late"
-    assert None in all_moments, "the UAV sees it come"
-    short = labels(shown_from_s=3.0)
-    assert len(short) == 6
-    assert set(short) == {None}
-
-
-def test_features_of_a_label_are_those_of_an_npc_that_waits() -> None:
-    scenario = scenario_with(6.0)
-    rows = labels_of(
-        recorded(scenario),
-        scenario,
-        LAWN,
-        "person-1",
-        Airframe(),
-        CHASING,
-    )
-    heights = [row.features[4] for row in rows]
-    assert heights[0] == 0, "it sees the UAV half a second late"
-    assert heights[4] == pytest.approx((10.0 - SINKS_MPS * 2.0) / 10, abs=0.02)
-    assert {row.features[2] for row in rows} == {0.6}

@@ -1,12 +1,16 @@
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from pytest_garl.execution.flight_id import Slot, slots
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.npcs.director_progress import DirectorProgress
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.plugin.options import population
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
@@ -14,6 +18,8 @@ from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.breeder import Breeder
 from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.search.method_catalogue import make_method, method_names
+from pytest_garl.search.teaching import Lessons
+from tests.execution.flying import Good, job_of
 from tests.search.searches import result
 
 MAP = load_map("court")
@@ -140,6 +146,54 @@ def test_the_ledger_says_how_each_scenario_was_made(tmp_path: Path) -> None:
     ledger.close()
     ledger = searched(tmp_path / "random.sqlite", "random", 28)
     assert ledger.facts.origins("s", 0) == []
+    ledger.close()
+
+
+class Counts(Lessons):
+    """Lessons whose director tells which generation was learned last."""
+
+    def __init__(self) -> None:
+        self.director = ""
+        self.learned: list[tuple[int, int]] = []
+
+    def learn(self, generation: int, scenarios: Sequence[str]) -> DirectorProgress:
+        self.learned.append((generation, len(scenarios)))
+        self.director = f"time-to-go {generation} 0"
+        return DirectorProgress(
+            npcs=generation, learned=0, shipped=0, rule=0, best=0, seen=0, expected=0, met=0
+        )
+
+
+def test_the_director_of_a_generation_has_learned_what_its_scenarios_were_bred_from(
+    tmp_path: Path,
+) -> None:
+    plan = SearchPlan(map=MAP, genome=GENOME, seed=1, population=4)
+    job = dataclasses.replace(job_of(Good, tmp_path), npcs=policy_spec("graded"))
+    ledger = Ledger.create(tmp_path / "ledger.sqlite", {})
+    ledger.add_search("s", "m:S", "court", 16, job.dumps())
+    wanted = {generation: range(4) for generation in range(4)}
+    lessons = Counts()
+    breeder = Breeder(ledger, "s", make_method("garl", plan), wanted, lessons)
+    flown_by: dict[int, set[str]] = {}
+    for _ in range(16):
+        breeder.advance()
+        claim = ledger.queue.claim()
+        assert claim is not None
+        director = dict(parse_job(claim.job).npcs.arguments).get("director", "")
+        flown_by.setdefault(claim.flight.slot.generation, set()).add(str(director))
+        ledger.queue.record(claim, result(parse_scenario(claim.scenario)), "", 0.0)
+    assert flown_by == {
+        0: {""},
+        1: {"time-to-go 0 0"},
+        2: {"time-to-go 0 0"},
+        3: {"time-to-go 1 0"},
+    }
+    assert lessons.learned == [(0, 4), (1, 4)]
+    progress = ledger.facts.progress("s", 1)
+    assert progress is not None
+    assert progress.npcs == 1
+    assert ledger.facts.progress("s", 3) is None
+    assert "time-to-go" not in (ledger.job("s") or ""), "the gate flies what ships"
     ledger.close()
 
 

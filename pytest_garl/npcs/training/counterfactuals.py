@@ -23,6 +23,8 @@ from pytest_garl.flight.flight import Flight
 from pytest_garl.npcs.director import FEATURES, Watch
 from pytest_garl.npcs.encounter import (
     AFTERMATH_STEPS,
+    COLLISION_WORTH,
+    PREVENTABLE_WORTH,
     WITHIN_S,
     Passage,
     could_be_prevented,
@@ -50,9 +52,8 @@ Meeting = tuple[float | None, float | None, float]
 HARMLESS, GROUNDED, COLLIDED, PREVENTABLE = range(4)
 """How a landing ends for its NPC: without a contact, with one of a UAV that had touched down, which
 counts for nobody, with a collision in the air, and with one that could have been prevented."""
-WORTH: Mapping[int, float] = {COLLIDED: 0.25, PREVENTABLE: 1.0}
-"""What an end is worth; others nothing.  A collision that nobody could have prevented shows little
-about a landing system, but it is on the way to one that somebody could."""
+WORTH: Mapping[int, float] = {COLLIDED: COLLISION_WORTH, PREVENTABLE: PREVENTABLE_WORTH}
+"""What an end is worth; others nothing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
