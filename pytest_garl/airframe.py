@@ -25,6 +25,13 @@ MOST_WIDENING = 3.0
 """A lens may show at most so many times the width and the height that a pinhole with the same
 picture and focal length shows."""
 _MOST_PIXELS = 3840 * 2160
+Vector = tuple[float, float, float]
+BELLY_M: Vector = (0.0, 0.0, -0.05)
+"""The place in the body of a camera that is not said to be elsewhere, and of a rangefinder."""
+MOST_OFFSET_M = 2.5
+"""As far from the body's middle as the largest airframe reaches."""
+LOWEST_OFFSET_M = -0.15
+"""A camera is above the ground where the UAV stands: its middle is 0.2 m above its feet."""
 NavigationKind = Literal["rtk", "gnss", "ideal"]
 """What the vehicle's navigation rests on."""
 
@@ -48,16 +55,20 @@ def _check(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Camera:
-    """A pinhole camera under the UAV's belly, looking along the body's -z axis.
+    """A pinhole camera on the UAV, by default under its belly, looking along the body's -z axis.
 
     Image right (+u) is the body's right (-y); image down (+v) is the body's back (-x).
-    At zero yaw (nose east) the image's top is east and its right is south.  ``distortion`` are
+    At zero yaw (nose east) the image's top is east and its right is south.  ``yaw_rad`` turns the
+    camera about the body's z axis: with pi/2 the image's top is the body's left.  ``tilt_rad`` then
+    tilts it from straight down to what the image's top shows: with pi/2 a camera without yaw looks
+    forward.  ``offset_m`` (x, y, z) is its place in the body.  ``distortion`` are
     the coefficients of its lens in OpenCV's order, k1, k2, p1, p2[, k3[, k4, k5, k6]]; none: a
     pinhole.  The default is 320x240 at 10 Hz with 90 degrees of horizontal field
     of view; the paper's code used 640x480.  Raises LandingSystemError for a camera that cannot be
     simulated: fewer than 16 pixels on a side, more than 3840x2160 in all, a field of view
     outside 0.05 to 3 rad (towards pi the image plane grows without limit), a rate outside
-    0.1 to 240 Hz, a distortion that folds back within the picture.
+    0.1 to 240 Hz, a distortion that folds back within the picture, a yaw beyond half a turn, a tilt
+    beyond pi/2, a place beyond 2.5 m or lower than 0.15 m below the body's middle.
     """
 
     width_px: int = 320
@@ -65,6 +76,9 @@ class Camera:
     field_of_view_rad: float = math.pi / 2
     rate_hz: float = 10.0
     distortion: tuple[float, ...] = ()
+    yaw_rad: float = 0.0
+    tilt_rad: float = 0.0
+    offset_m: Vector = BELLY_M
 
     def __post_init__(self) -> None:
         for name in ("width_px", "height_px"):
@@ -76,6 +90,9 @@ class Camera:
             )
         _check("Camera", "field_of_view_rad", self.field_of_view_rad, 0.05, 3.0, "rad")
         _check("Camera", "rate_hz", self.rate_hz, 0.1, MAX_RATE_HZ, "Hz")
+        _check("Camera", "yaw_rad", self.yaw_rad, -math.pi, math.pi, "rad")
+        _check("Camera", "tilt_rad", self.tilt_rad, -math.pi / 2, math.pi / 2, "rad")
+        object.__setattr__(self, "offset_m", _offset(self.offset_m))
         object.__setattr__(self, "distortion", _coefficients(self.distortion))
         if self.distortion:
             self._check_lens()
@@ -107,6 +124,11 @@ class Camera:
             )
 
     @property
+    def is_turned(self) -> bool:
+        """Whether it looks elsewhere than straight down with the image's top ahead."""
+        return self.yaw_rad != 0.0 or self.tilt_rad != 0.0
+
+    @property
     def focal_px(self) -> float:
         """Focal length in pixels, the same on both axes."""
         return self.width_px / 2 / math.tan(self.field_of_view_rad / 2)
@@ -123,6 +145,22 @@ class Camera:
 
         (cx, cy), f = self.centre_px, self.focal_px
         return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
+
+
+def _offset(found: object) -> Vector:
+    """Return a place in the body as plain floats; raise LandingSystemError for others."""
+    try:
+        x, y, z = (float(each) for each in found)  # type: ignore[attr-defined]
+    except (TypeError, ValueError, OverflowError):
+        x = math.nan
+        y = z = x
+    if not (max(abs(x), abs(y), abs(z)) <= MOST_OFFSET_M and z >= LOWEST_OFFSET_M):
+        raise LandingSystemError(
+            f"Camera.offset_m = {found!r:.80}; expected (x, y, z) in metres from the body's "
+            f"middle, x forward, y left, z up, none beyond {MOST_OFFSET_M:g} m and z not below "
+            f"{LOWEST_OFFSET_M:g} m"
+        )
+    return x, y, z
 
 
 def _coefficients(found: object) -> tuple[float, ...]:
@@ -142,7 +180,7 @@ def _coefficients(found: object) -> tuple[float, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rangefinder:
-    """A laser rangefinder beside the camera, which measures along the body's -z axis.
+    """A laser rangefinder under the belly, which measures along the body's -z axis.
 
     It reads once per camera frame, and has no reading of what is nearer than ``least_m`` or farther
     than ``most_m``.  The default is LightWare's SF11/C, with the limits that PX4 has for it; a
@@ -236,6 +274,9 @@ def airframe_of(system: object) -> Airframe:
             field_of_view_rad=float(camera.field_of_view_rad),
             rate_hz=float(camera.rate_hz),
             distortion=camera.distortion,
+            yaw_rad=float(camera.yaw_rad),
+            tilt_rad=float(camera.tilt_rad),
+            offset_m=camera.offset_m,
         ),
         latency_s=float(airframe.latency_s),
         control_rate_hz=None

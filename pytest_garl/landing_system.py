@@ -10,7 +10,8 @@ A landing system is any class with two methods; there is nothing to inherit::
 
 World frame: metres, seconds, radians; x east, y north, z up; origin on the ground at
 the map's centre.  Quaternions are x, y, z, w and turn body vectors into world vectors.
-The body frame is x forward, y left, z up; the camera looks along the body's -z axis.
+The body frame is x forward, y left, z up; the camera looks along the body's -z axis, unless the
+airframe says otherwise.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ class Observation:
     is the quaternion (4,); ``image`` is RGB uint8 (H, W, 3) and ``depth_m`` is planar
     depth float32 (H, W) in metres: 0 where nothing is measured, 100 where an unlimited depth
     camera sees nothing.  The arrays are read-only.  ``rangefinder_m`` is the distance
-    from the camera's place to what lies below along the body's axis; None without a rangefinder,
+    from the belly to what lies below along the body's axis; None without a rangefinder,
     and if nothing is in its range.
     """
 

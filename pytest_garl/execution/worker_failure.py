@@ -82,7 +82,8 @@ def _result(claim: Claim, ended: WorkerExit, repeated: bool, inconclusive: bool)
 def _crash(ended: WorkerExit) -> Crash:
     """Return the exit as the crash of a flight."""
     if ended.hung:
-        return Crash(kind="hung", error="Timeout", message=ended.hung, traceback=ended.stacks)
+        said = f"{ended.stderr.strip()}\n{ended.stacks}".lstrip()
+        return Crash(kind="hung", error="Timeout", message=ended.hung, traceback=said)
     if ended.failure:
         error, message, text = ended.failure
         if error != LandingSystemError.__name__:

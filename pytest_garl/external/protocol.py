@@ -47,7 +47,6 @@ _TURNS: dict[str, Callable[[Any], Any]] = {
     "gps_position_m": turned_vector,
     "home_m": turned_vector,
     "target_m": turned_vector,
-    "offset_m": turned_vector,
 }
 """The values that differ in NED, by their names."""
 
@@ -101,13 +100,17 @@ def read_hello(line: bytes) -> Hello:
 
 def reset_line(mission: Mission, hello: Hello, memory: dict[str, Any]) -> bytes:
     """Return the request that begins a flight."""
-    facts = dataclasses.asdict(mission)
-    facts["camera"] = _camera(mission.camera)
-    return _line({"type": "reset", **_turned(facts, hello), "memory": memory})
+    facts = _turned(dataclasses.asdict(mission), hello)
+    facts["camera"] = _camera(mission.camera, hello)
+    return _line({"type": "reset", **facts, "memory": memory})
 
 
-def _camera(camera: Camera) -> dict[str, Any]:
+def _camera(camera: Camera, hello: Hello) -> dict[str, Any]:
     facts = dataclasses.asdict(camera)
+    if hello.frame == "NED":
+        x, y, z = camera.offset_m
+        # In the body: to the right and down, not to the left and up.
+        facts |= {"yaw_rad": -camera.yaw_rad, "offset_m": (x, -y, -z)}
     return {**facts, "focal_px": camera.focal_px, "centre_px": camera.centre_px}
 
 
@@ -177,22 +180,10 @@ def _read_detection(value: Any, hello: Hello) -> Any:
 
 
 def _turned(facts: dict[str, Any], hello: Hello) -> dict[str, Any]:
-    """Return the facts in the other frame if the program flies in NED; in tables of it too."""
+    """Return the facts in the other frame if the program flies in NED."""
     if hello.frame == "ENU":
         return facts
-    turned = {}
-    for key, value in facts.items():
-        if isinstance(value, dict):
-            turned[key] = _turned(value, hello)
-        elif key == "detections":
-            turned[key] = value
-        else:
-            turned[key] = _TURNS.get(key, _same)(value)
-    return turned
-
-
-def _same(value: Any) -> Any:
-    return value
+    return {key: _TURNS[key](value) if key in _TURNS else value for key, value in facts.items()}
 
 
 def _plain(fields: dict[str, Any]) -> dict[str, Any]:

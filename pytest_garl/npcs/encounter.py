@@ -25,7 +25,8 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import ObjectType
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.camera.projection import CAMERA_BELOW_M
+from pytest_garl.simulation.camera.meshes import rotation_matrix
+from pytest_garl.simulation.camera.true_camera import mount_of
 from pytest_garl.simulation.landing_moments import LandingMoments
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Situation
 from pytest_garl.simulation.physics.npc import Npc
@@ -72,7 +73,13 @@ def in_picture(
     forward = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], 1)
     left = np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], 1)
     up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], 1)
-    eye = uav.position_m - CAMERA_BELOW_M * up
+    x, y, z = camera.offset_m
+    eye = uav.position_m + z * up
+    if x or y:
+        eye = eye + x * forward + y * left
+    if camera.is_turned:
+        body = np.stack([forward, left, up], 2)
+        forward, left, up = np.moveaxis(body @ rotation_matrix(mount_of(camera)), 2, 0)
     half_width = math.tan(camera.field_of_view_rad / 2)
     half_height = half_width * camera.height_px / camera.width_px
     shown = np.zeros(len(eye), dtype=bool)

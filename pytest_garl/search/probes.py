@@ -30,7 +30,7 @@ from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import problems, repair
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import eye_under
-from pytest_garl.simulation.camera.true_camera import true_camera
+from pytest_garl.simulation.camera.true_camera import looks_at, true_camera
 from pytest_garl.simulation.landing_moments import LandingMoments
 from pytest_garl.simulation.nominal import LEVEL
 from pytest_garl.verdicts.evidence import Evidence
@@ -263,7 +263,8 @@ def _readable_from_m(scenario: Scenario, map: Map, camera: Camera, top_m: float)
     renderer = renderer_of(placed, true_camera(camera, scenario), LandingMoments(), colour=False)
     for step in range(HEIGHTS, 0, -1):
         height = top_m * step / HEIGHTS
-        frame = renderer.render(eye_under((*placed.marker_m, height), LEVEL), LEVEL, 0.0, [])
+        eye = eye_under(looks_at(camera, placed.marker_m, height), LEVEL, camera.offset_m)
+        frame = renderer.render(eye, LEVEL, 0.0, [])
         if readable_probability(frame.marker) >= READABLE:
             return height
     return 0.0

@@ -250,7 +250,7 @@ class Loop:
     def eye(self) -> tuple[Vector, Quaternion]:
         """Return the camera's place and the UAV's attitude."""
         position, attitude, _, _ = self._world.uav_state()
-        return eye_under(position, attitude), attitude
+        return eye_under(position, attitude, self.camera.offset_m), attitude
 
     def _observe(self, tick: int, motion: Motion, estimate: Motion) -> None:
         """Show the landing system what has arrived, and queue its commands for their latency."""

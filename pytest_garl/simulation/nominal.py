@@ -2,7 +2,8 @@
 
 A nominal landing climbs to the search height, crosses to the coordinate that the mission tells,
 looks for the marker from there and from a ring about it, crosses to the marker and comes down.
-Its camera is level, its nose points east.  Nothing is painted.
+It is level, its nose points east.  A camera that is mounted with a tilt looks from so far aside
+that it shows the place.  Nothing is painted.
 
 Where the sight of the marker may change, it waits if need be: above the marker it climbs and comes
 down again, until the time is up or the landing was given up.  So a marker that is covered for a
@@ -25,7 +26,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.solids import BodyPose
-from pytest_garl.simulation.camera.true_camera import Mounting, true_camera
+from pytest_garl.simulation.camera.true_camera import Mounting, looks_at, true_camera
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.events import Event
 from pytest_garl.simulation.landing_moments import RecordedMoments
@@ -101,7 +102,7 @@ def nominal_views(flight: Flight, placed: Placed, camera: Camera) -> tuple[Nomin
             shown, known = present, {}
         if outage.happens(look.time_s):
             continue
-        eye = eye_under((*look.place_m, look.height_m), LEVEL)
+        eye = eye_under(looks_at(camera, look.place_m, look.height_m), LEVEL, camera.offset_m)
         poses = tuple(_pose(item, look.time_s) for item in flight.objects)
         sight = eye, poses, cover.happens(look.time_s)
         if sight not in known:

@@ -102,7 +102,7 @@ class Sensors:
             return black
         if self._outage.happens(now):
             return self._last_look or black
-        eye = eye_under(motion.position_m, motion.attitude)
+        eye = eye_under(motion.position_m, motion.attitude, self._camera.offset_m)
         poses = [(npc.position_m, npc.yaw_rad) for npc in self._npcs]
         attitude = self._mounting.attitude(motion.attitude)
         movement = Movement(

@@ -10,6 +10,7 @@ from pathlib import Path
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.landing_system import Land, Observation
+from pytest_garl.program import AnySystem
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
@@ -78,7 +79,7 @@ def scenario(fog: float = 0.0) -> Scenario:
     return nominal.replace({"environment.fog": fog})
 
 
-def job_of(system: type, flights: Path, timeout_s: float = 10.0) -> FlightJob:
+def job_of(system: AnySystem, flights: Path, timeout_s: float = 10.0) -> FlightJob:
     return FlightJob.for_system(
         reference_to(system),
         LAWN,

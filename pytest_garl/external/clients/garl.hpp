@@ -44,6 +44,8 @@ struct Camera {
   double field_of_view_rad = 0, rate_hz = 0, focal_px = 0;
   Vec2 centre_px{};
   std::vector<double> distortion;
+  double yaw_rad = 0, tilt_rad = 0;  // how it is mounted: 0 looks straight down, its top ahead
+  Vec3 offset_m{};
 };
 
 struct Mission {
@@ -378,6 +380,9 @@ class Link {
     mission.camera.rate_hz = camera.at("rate_hz").number;
     mission.camera.focal_px = camera.at("focal_px").number;
     mission.camera.centre_px = camera.at("centre_px").vector<2>();
+    mission.camera.yaw_rad = camera.at("yaw_rad").number;
+    mission.camera.tilt_rad = camera.at("tilt_rad").number;
+    mission.camera.offset_m = camera.at("offset_m").vector<3>();
     for (const json::Value& each : camera.at("distortion").items) {
       mission.camera.distortion.push_back(each.number);
     }

@@ -28,9 +28,8 @@ class CameraPane:
 
     def draw(self, poses: Poses, step: Step | None) -> drawing.Image:
         """Return the pane; ``step`` is the landing system's answer to this very frame."""
-        frame = self._renderer.render(
-            poses.eye_m, poses.attitude, poses.time_s, poses.objects
-        ).image
+        eye = poses.eye_m(self._renderer.camera)
+        frame = self._renderer.render(eye, poses.attitude, poses.time_s, poses.objects).image
         way = cv2.INTER_AREA if self._scale < 1 else cv2.INTER_LINEAR
         view = np.asarray(cv2.resize(frame, self._size, interpolation=way), np.uint8)
         seen = step.diagnostics.detections if step and step.diagnostics else ()
@@ -45,7 +44,8 @@ class CameraPane:
         return pane
 
     def _marker(self, poses: Poses) -> NDArray[np.float64]:
-        return self._pixels(self._renderer.marker_outline(poses.eye_m, poses.attitude))
+        eye = poses.eye_m(self._renderer.camera)
+        return self._pixels(self._renderer.marker_outline(eye, poses.attitude))
 
     def _detection(self, view: drawing.Image, detection: Detection) -> None:
         words = f"id {detection.marker_id}  {detection.confidence:.2f}"

@@ -124,7 +124,7 @@ class MapPane:
 
     def _draw_footprint(self, pane: drawing.Image, poses: Poses) -> None:
         """Outline the ground in view, with a thick upper edge, unless the horizon is in view."""
-        view = View.of(self._camera, poses.eye_m, poses.attitude)
+        view = View.of(self._camera, poses.eye_m(self._camera), poses.attitude)
         right, low = self._camera.width_px - 0.5, self._camera.height_px - 0.5
         corners = np.array([[-0.5, -0.5, 1], [right, -0.5, 1], [right, low, 1], [-0.5, low, 1]])
         ground = view.ground_of_pixel @ corners.T

@@ -9,19 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.flight.flight import Flight, Track
+from pytest_garl.landing_system import Camera
 from pytest_garl.simulation.camera.projection import Quaternion, Vector, eye_under
 from pytest_garl.simulation.camera.solids import BodyPose
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Poses:
-    """Poses at one time: the UAV's, its camera's place, and (position, yaw) of each object."""
+    """Poses at one time: the UAV's, and (position, yaw) of each object."""
 
     time_s: float
     position_m: Vector
     attitude: Quaternion
-    eye_m: Vector
     objects: tuple[BodyPose, ...]
+
+    def eye_m(self, camera: Camera) -> Vector:
+        """Return the place of the UAV's camera."""
+        return eye_under(self.position_m, self.attitude, camera.offset_m)
 
 
 def poses_at(flight: Flight, time_s: float) -> Poses:
@@ -35,7 +39,6 @@ def poses_at(flight: Flight, time_s: float) -> Poses:
         time_s=time_s,
         position_m=position,
         attitude=attitude,
-        eye_m=eye_under(position, attitude),
         objects=tuple(objects),
     )
 

@@ -24,7 +24,12 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.exposure import Movement
 from pytest_garl.simulation.camera.projection import NEAR_M, Quaternion, Vector, View
-from pytest_garl.simulation.camera.true_camera import Mounting, product, true_camera
+from pytest_garl.simulation.camera.true_camera import (
+    Mounting,
+    mount_of,
+    product,
+    true_camera,
+)
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.events import Event
 from pytest_garl.simulation.landing_moments import RecordedMoments
@@ -40,7 +45,8 @@ class ShownPicture:
 
     ``outline_px`` (n, 2) is the marker's true outline, also outside of the picture; it is empty if
     the picture does not show the moment at which it was taken, because the camera failed.
-    ``eye_m`` and ``attitude`` are the place and the attitude of the camera.
+    ``eye_m`` is the place of the camera, ``attitude`` that of a UAV on which the declared camera
+    would look so.
     """
 
     time_s: float
@@ -63,8 +69,8 @@ class ShownPictures:
 
     @property
     def turn(self) -> Quaternion:
-        """The attitude of the camera on a level UAV: how it is mounted."""
-        return self._mounting.attitude(LEVEL)
+        """The turn of the camera on a level UAV: how it is mounted."""
+        return product(self._mounting.attitude(LEVEL), mount_of(self.camera))
 
     def __iter__(self) -> Iterator[ShownPicture]:
         """Draw the pictures one after the other, in the order of time."""
@@ -76,7 +82,7 @@ class ShownPictures:
         present = scenario
         for time_s, step in zip(self.times_s, flight.steps, strict=True):
             poses = poses_at(flight, time_s)
-            attitude = self._mounting.attitude(poses.attitude)
+            attitude, eye = self._mounting.attitude(poses.attitude), poses.eye_m(self.camera)
             outline = np.zeros((0, 2), np.float32)
             if outage.happens(time_s):
                 image = last if freezes else black
@@ -85,15 +91,15 @@ class ShownPictures:
                     renderer.change(now)
                     present = now
                 movement = _movement(flight, poses)
-                frame = renderer.render(poses.eye_m, attitude, time_s, poses.objects, movement)
+                frame = renderer.render(eye, attitude, time_s, poses.objects, movement)
                 image = last = frame.image
-                outline = renderer.marker_outline(poses.eye_m, attitude)
+                outline = renderer.marker_outline(eye, attitude)
             yield ShownPicture(
                 time_s=time_s,
                 step=step,
                 image=image,
                 outline_px=outline,
-                eye_m=poses.eye_m,
+                eye_m=eye,
                 attitude=attitude,
             )
 

@@ -9,6 +9,7 @@ import numpy as np
 from foxglove.messages import FrameTransform, FrameTransforms
 from numpy.typing import NDArray
 
+from pytest_garl.airframe import BELLY_M
 from pytest_garl.flight.flight import Flight, Track
 from pytest_garl.reports.mcap.values import (
     CAMERA_FRAME,
@@ -21,7 +22,7 @@ from pytest_garl.reports.mcap.values import (
     stamp,
     vector,
 )
-from pytest_garl.simulation.camera.projection import CAMERA_BELOW_M, Quaternion
+from pytest_garl.simulation.camera.projection import Quaternion, Vector
 from pytest_garl.simulation.camera.true_camera import product
 
 TOPIC = "/tf"
@@ -32,11 +33,15 @@ Array = NDArray[np.float64]
 
 
 def transforms(
-    flight: Flight, pictures_s: Sequence[float], camera_turn: Quaternion | None
+    flight: Flight,
+    pictures_s: Sequence[float],
+    camera_turn: Quaternion | None,
+    camera_m: Vector = BELLY_M,
 ) -> Iterator[Logged]:
     """Yield all transforms at each sample of the tracks and at each picture.
 
-    ``camera_turn`` is how the camera is mounted on the UAV; None for a flight without a camera.
+    ``camera_turn`` is how the camera is mounted on the UAV, and ``camera_m`` where; the turn is
+    None for a flight without a camera.
     Each message holds all frames, so that a viewer that jumps to a time needs only one.
     """
     names = [UAV_FRAME, *(item.name for item in flight.objects)]
@@ -49,8 +54,8 @@ def transforms(
             for name, (places, attitudes) in zip(names, tracks, strict=True)
         ]
         if camera_turn is not None:
-            below, turn = (0.0, 0.0, -CAMERA_BELOW_M), product(camera_turn, OPTICAL)
-            found.append(_transform(time_ns, UAV_FRAME, CAMERA_FRAME, below, turn))
+            turn = product(camera_turn, OPTICAL)
+            found.append(_transform(time_ns, UAV_FRAME, CAMERA_FRAME, camera_m, turn))
         yield Logged(time_ns=time_ns, topic=TOPIC, message=FrameTransforms(transforms=found))
 
 

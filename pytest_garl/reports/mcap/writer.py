@@ -70,7 +70,10 @@ def in_order(export: Export) -> Iterator[Logged]:
         streams.append(transforms(flight, (), None))
     else:
         # Before the pictures of the same time, which need them.
-        streams += [transforms(flight, pictures.times_s, pictures.turn), camera_topics(pictures)]
+        streams += [
+            transforms(flight, pictures.times_s, pictures.turn, pictures.camera.offset_m),
+            camera_topics(pictures),
+        ]
     streams += [states(flight, export.limits), sights(flight), plans(flight)]
     streams.append(events(export, judge(flight, export.limits)))
     return heapq.merge(*streams, key=lambda logged: logged.time_ns)

@@ -43,6 +43,9 @@ class Lens:
             height_px=min(high, int(MOST_WIDENING * height)),
             field_of_view_rad=2 * math.atan(wide / 2 / focal),
             rate_hz=camera.rate_hz,
+            yaw_rad=camera.yaw_rad,
+            tilt_rad=camera.tilt_rad,
+            offset_m=camera.offset_m,
         )
         places = seen * focal + np.array(self.pinhole.centre_px)
         self._columns, self._rows = np.ascontiguousarray(

@@ -12,23 +12,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.landing_system import Camera
+from pytest_garl.airframe import BELLY_M, Camera
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.simulation.camera.meshes import clip_polygon, rotation_matrix
+from pytest_garl.simulation.camera.true_camera import mount_of, product
 
 Array = NDArray[np.float32]
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
-CAMERA_BELOW_M = 0.05
 NEAR_M = 0.05
 FAR_M = 100.0
 _FARTHEST_PX = np.float32(2e4)
 """Pixel coordinates are bounded so that fixed-point drawing does not overflow."""
 
 
-def eye_under(position_m: Vector, attitude: Quaternion) -> Vector:
-    """Return the camera's place under a UAV at ``position_m``."""
-    dx, dy, dz = rotate(attitude, (0.0, 0.0, -CAMERA_BELOW_M))
+def eye_under(position_m: Vector, attitude: Quaternion, offset_m: Vector = BELLY_M) -> Vector:
+    """Return the place in the world of a camera at ``offset_m`` of a UAV at ``position_m``."""
+    dx, dy, dz = rotate(attitude, offset_m)
     return position_m[0] + dx, position_m[1] + dy, position_m[2] + dz
 
 
@@ -42,8 +42,8 @@ class View:
 
     @classmethod
     def of(cls, camera: Camera, position_m: Vector, q: Quaternion) -> View:
-        """Return the view of a camera under a UAV with attitude ``q``."""
-        body = rotation_matrix(q)
+        """Return the view of a camera at ``position_m``, on a UAV with attitude ``q``."""
+        body = rotation_matrix(product(q, mount_of(camera)) if camera.is_turned else q)
         axes = np.empty((3, 3))
         for row, column in zip(axes, (1, 0, 2), strict=True):
             np.negative(body[:, column], out=row)

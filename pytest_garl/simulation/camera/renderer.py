@@ -28,7 +28,7 @@ from pytest_garl.simulation.camera.lens import lens_of
 from pytest_garl.simulation.camera.marker_patch import paint_patch
 from pytest_garl.simulation.camera.marker_sight import BoardSight, MarkerSight
 from pytest_garl.simulation.camera.particles import Particles
-from pytest_garl.simulation.camera.projection import FAR_M, View, ground_depth
+from pytest_garl.simulation.camera.projection import FAR_M, NEAR_M, View, ground_depth
 from pytest_garl.simulation.camera.solids import (
     BodyPose,
     PaintedSolid,
@@ -65,6 +65,7 @@ class _Scene:
     time_s: float
     depth_m: Array
     footprint_m: float
+    inset_footprint_m: float
     sky: NDArray[np.bool_] | None
     shadows: Sequence[Shadow]
     layers: Sequence[PaintedSolid]
@@ -206,6 +207,7 @@ class Renderer:
             time_s=time_s,
             depth_m=depth,
             footprint_m=footprint,
+            inset_footprint_m=self._inset_footprint_m(view, footprint),
             sky=sky,
             shadows=shadows,
             layers=layers,
@@ -225,6 +227,17 @@ class Renderer:
             segmentation=segmentation,
             pixels=pixels,
         )
+
+    def _inset_footprint_m(self, view: View, middle_m: float) -> float:
+        """Return the size of a pixel on the ground about the marker.
+
+        ``middle_m`` is that in the picture's middle: the same under a camera that looks down.
+        """
+        if not self._drawn.is_turned:
+            return middle_m
+        x, y = self.pad.place_m
+        depth = float(view.axes[2] @ (np.array([x, y, 0.0]) - view.eye))
+        return depth / self.camera.focal_px if depth > NEAR_M else middle_m
 
     def _marker_view(self, scene: _Scene) -> MarkerView | None:
         gloss = gloss_of(scene.view, scene.look.conditions, self.camera.focal_px)
@@ -316,7 +329,7 @@ def _draw_marker(
 
 
 def _ground_image(scene: _Scene) -> NDArray[np.uint8]:
-    view, ground, footprint = scene.view, _painted(scene.ground), scene.footprint_m
+    view, ground, footprint = scene.view, _painted(scene.ground), scene.inset_footprint_m
     world = view.ground_of_pixel
     height, width = scene.depth_m.shape
     # Four channels: warpPerspective is 2.5 times as fast as with three.
@@ -324,7 +337,7 @@ def _ground_image(scene: _Scene) -> NDArray[np.uint8]:
     inset = ground.inset
     rows, columns = slice(0, height), slice(0, width)
     if scene.sky is not None or not _stays_within(image, *_scaled(inset, world, footprint)):
-        _warp(ground.wide, image, world, footprint, cv2.BORDER_REFLECT_101)
+        _warp(ground.wide, image, world, scene.footprint_m, cv2.BORDER_REFLECT_101)
         rows, columns = view.box(view.ground_polygon(inset.outline))
     part = image[rows, columns]
     if part.size:

@@ -34,7 +34,8 @@ def test_there_are_poses_of_the_camera_at_each_picture(exported: Exported) -> No
     for time_ns, _ in recording.topics["/camera/image"]:
         matrix = matrix_to_world(recording.at("/tf", time_ns), "camera")
         poses = poses_at(flight, time_ns / 1e9)
-        view = View.of(Hovers.airframe.camera, poses.eye_m, poses.attitude)
+        camera = Hovers.airframe.camera
+        view = View.of(camera, poses.eye_m(camera), poses.attitude)
         assert matrix[:3, 3] == pytest.approx(view.eye, abs=1e-9)
         # Right, down and forward are the columns of one matrix and the rows of the other.
         assert matrix[:3, :3] == pytest.approx(view.axes.T, abs=1e-9)
