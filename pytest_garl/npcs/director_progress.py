@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -24,3 +26,25 @@ class DirectorProgress:
     seen: int
     expected: float
     met: int
+
+
+def total(progresses: Iterable[DirectorProgress]) -> DirectorProgress | None:
+    """Return what several generations say together; None if no NPC could have begun."""
+    found = [each for each in progresses if each.npcs]
+    npcs = sum(each.npcs for each in found)
+    if not npcs:
+        return None
+
+    def mean(worth: str) -> float:
+        return math.fsum(getattr(each, worth) * each.npcs for each in found) / npcs
+
+    return DirectorProgress(
+        npcs=npcs,
+        learned=mean("learned"),
+        shipped=mean("shipped"),
+        rule=mean("rule"),
+        best=mean("best"),
+        seen=sum(each.seen for each in found),
+        expected=math.fsum(each.expected for each in found),
+        met=sum(each.met for each in found),
+    )

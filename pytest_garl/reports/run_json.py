@@ -82,6 +82,7 @@ def _search(run: RunRecord, search: SearchRecord) -> dict[str, Any]:
         "origins": [dataclasses.asdict(each) for each in search.origins],
         "model": None if search.model is None else dataclasses.asdict(search.model),
         "movers": None if search.movers is None else dataclasses.asdict(search.movers),
+        "director": None if search.director is None else dataclasses.asdict(search.director),
         "signatures": [
             {
                 **_kind(run, search, kind),

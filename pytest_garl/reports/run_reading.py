@@ -19,6 +19,7 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import Origin
 from pytest_garl.execution.severity import Severity
 from pytest_garl.execution.stored_ledger import checked_ledger
+from pytest_garl.npcs.director_progress import DirectorProgress, total
 from pytest_garl.reports.control_arm import control_arm, is_control
 from pytest_garl.reports.run_record import (
     KindRecord,
@@ -147,8 +148,15 @@ def _search(
         origins=origin_records(made),
         model=model_record(made),
         movers=mover_record((flight, jobs[flight.id.search].npcs) for flight in flights),
+        director=_director(facts, flights),
         camera=facts.camera(key.system),
     )
+
+
+def _director(facts: Facts, flights: Sequence[LedgerFlight]) -> DirectorProgress | None:
+    """Return what the generations of a search say of its director."""
+    generations = sorted({(each.id.search, each.id.slot.generation) for each in flights})
+    return total(filter(None, (facts.progress(*each) for each in generations)))
 
 
 def _with_origins(facts: Facts, flights: Sequence[LedgerFlight]) -> Made:

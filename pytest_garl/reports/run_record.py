@@ -21,6 +21,7 @@ from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.severity import Severity
+from pytest_garl.npcs.director_progress import DirectorProgress
 from pytest_garl.reports.causes import cause_of, tells_cause, title_of
 from pytest_garl.reports.control_arm import ControlArm
 from pytest_garl.reports.search_origins import ModelRecord, MoverRecord, OriginRecord
@@ -212,6 +213,8 @@ class SearchRecord:
     """How well the model of the landing system predicted; None without one."""
     movers: MoverRecord | None = None
     """Who moved the NPCs; None without NPCs."""
+    director: DirectorProgress | None = None
+    """What the flights say of the director that learned from them; None if none did."""
     camera: Mapping[str, Any] | None = None
     """What the ledger says of the landing system's camera; None if it does not."""
 

@@ -47,7 +47,12 @@ def run_text(run: RunRecord) -> str:
             f"gave up: {counts_text(search.gave_up)}"
             f"{f'; ran out of time: {counts_text(late)}' if any(late.values()) else ''}"
         )
-        told = (control_text(search), origins_text(search), movers_text(search))
+        told = (
+            control_text(search),
+            origins_text(search),
+            movers_text(search),
+            director_text(search),
+        )
         lines += [f"  {text}" for text in told if text]
         lines += [line for kind in search.kinds for line in _kind_lines(run, search, kind)]
     return "\n".join([*lines, ""]) if lines else "no flights yet\n"
@@ -119,6 +124,7 @@ def kinds_lines(search: SearchRecord) -> list[str]:
         control_text(search),
         origins_text(search),
         movers_text(search),
+        director_text(search),
     )
     return [text for text in texts if text]
 
@@ -191,6 +197,23 @@ def movers_text(search: SearchRecord) -> str:
     return (
         f"{told}; the director decided in {movers.directed} of {movers.interfering} flights with "
         "an NPC that knows of the UAV"
+    )
+
+
+def director_text(search: SearchRecord) -> str:
+    """Return how good the director was that learned this landing system; empty without one."""
+    director = search.director
+    if director is None:
+        return ""
+    seen = (
+        f"; of {director.seen} NPCs that were seen coming it expected {director.expected:.1f} to "
+        f"meet the UAV, and {director.met} did"
+    )
+    return (
+        f"begins of {director.npcs} NPCs (1 is a collision that the system could have prevented): "
+        f"as the director decides that learned from these flights {director.learned:.2f}, with the "
+        f"weights that ship {director.shipped:.2f}, by the fixed rule {director.rule:.2f}, at best "
+        f"{director.best:.2f}{seen if director.seen else ''}"
     )
 
 

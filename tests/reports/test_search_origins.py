@@ -11,9 +11,10 @@ from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import Origin
+from pytest_garl.npcs.director_progress import DirectorProgress, total
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.reports.run_record import SearchRecord
-from pytest_garl.reports.run_text import movers_text, origins_text
+from pytest_garl.reports.run_text import director_text, movers_text, origins_text
 from pytest_garl.reports.search_origins import (
     MoverRecord,
     model_record,
@@ -157,3 +158,34 @@ def test_who_moved_the_npcs_is_told_in_one_line() -> None:
     movers = mover_record([(STORIES[0], policy_spec("dqn"))])
     moved = dataclasses.replace(search, movers=movers, npcs=("dqn",))
     assert movers_text(moved) == "who said when NPCs begin: the policy dqn for 1"
+
+
+def test_the_summary_says_how_good_the_director_was_in_all_generations() -> None:
+    quiet = DirectorProgress(
+        npcs=0, learned=0, shipped=0, rule=0, best=0, seen=0, expected=0, met=0
+    )
+    first, second = (
+        DirectorProgress(
+            npcs=npcs,
+            learned=learned,
+            shipped=0.1,
+            rule=0.05,
+            best=0.5,
+            seen=seen,
+            expected=seen / 2,
+            met=1,
+        )
+        for npcs, learned, seen in ((1, 0.1, 1), (3, 0.3, 2))
+    )
+    assert total([quiet]) is None
+    assert total([quiet, first]) == first
+    key = SearchKey(system="m:S", map="lawn")
+    search = SearchRecord(key=key, name=key.place, flights=(), kinds=(), violating=0)
+    assert director_text(search) == ""
+    told = dataclasses.replace(search, director=total([first, quiet, second]))
+    assert director_text(told) == (
+        "begins of 4 NPCs (1 is a collision that the system could have prevented): as the director "
+        "decides that learned from these flights 0.25, with the weights that ship 0.10, by the "
+        "fixed rule 0.05, at best 0.50; of 3 NPCs that were seen coming it expected 1.5 to meet "
+        "the UAV, and 2 did"
+    )

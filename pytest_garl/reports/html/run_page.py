@@ -19,6 +19,7 @@ from pytest_garl.reports.run_text import (
     PAPER_DEFINITION,
     counted_causes,
     counts_text,
+    director_text,
     in_control_text,
     kinds_lines,
     limits_text,
@@ -168,6 +169,8 @@ def figures(search: SearchRecord) -> list[Fact]:
         )
     if search.movers is not None:
         found.append(("who moved the NPCs", movers_text(search)))
+    if search.director is not None:
+        found.append(("what begins of NPCs were worth", director_text(search)))
     return [figure for figure in found if figure[1]]
 
 
