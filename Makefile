@@ -79,9 +79,9 @@ test-ray: $(CLUSTERS)  ## the tests that start Ray clusters: minutes, so not par
 bench: $(READY)  ## measure frames, flights and the plugin's overhead
 	$(BIN)/python -m lab.benchmarks
 
-faults: $(READY)  ## search for planted faults and print mutation scores: a day on two cores
-	$(BIN)/python -m lab.faults
-	$(BIN)/python -m lab.faults --report
+faults: $(READY)  ## search for planted faults with all arms and print the tables: a day on two cores
+	$(BIN)/python -m lab.judges faults
+	$(BIN)/python -m lab.judges faults --report
 
 experiment-smoke: $(READY)  ## fly, measure and report an experiment at toy size
 	rm -rf $(SMOKE)

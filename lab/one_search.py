@@ -22,12 +22,12 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from lab.arms import ARMS, DOMAIN, FROZEN, arm_named
+from lab.arms import ARMS, DOMAIN, FROZEN, Arm, arm_named
 from lab.table import ResultTable
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.fly_and_judge import judged
-from pytest_garl.execution.reference import SYSTEM_NAME, Reference
+from pytest_garl.execution.reference import system_named
 from pytest_garl.execution.result import FlightResult, Origin
 from pytest_garl.plugin.options import population
 from pytest_garl.scenarios.domains.genome import genome_of
@@ -62,17 +62,6 @@ class SearchTask:
         return self.system, self.map, self.arm, str(self.seed)
 
 
-def system_named(name: str) -> Any:
-    """Return a landing system "module:Class"; raise GarlError if it cannot be imported."""
-    module, _, qualname = name.partition(":")
-    if not SYSTEM_NAME.fullmatch(name):
-        raise GarlError(f"landing system {name!r}: expected MODULE:CLASS")
-    try:
-        return Reference(module=module, file="", qualname=qualname).load()
-    except (ImportError, AttributeError, OSError) as error:
-        raise GarlError(f"landing system {name!r} cannot be imported: {error}") from error
-
-
 def fly_one(system: str, npcs: PolicySpec, scenario: Scenario) -> FlightResult:
     """Fly a landing system through a scenario; return the judged result."""
     import cv2
@@ -89,36 +78,59 @@ def plan_of(map_name: str, seed: int, flights: int) -> SearchPlan:
     return SearchPlan(map=map, genome=genome, seed=seed, population=population(flights))
 
 
-def rows_of(
-    task: SearchTask, fly_all: Callable[[Sequence[Scenario]], Iterator[FlightResult]]
-) -> Iterator[dict[str, Any]]:
-    """Yield the row of each flight, up to the first that matches."""
-    method, flown = arm_named(task.arm).make(plan_of(task.map, task.seed, task.flights)), 0
-    while flown < task.flights:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchFlight:
+    """One flight of a search: its number from 1 on, and who moved its NPCs."""
+
+    number: int
+    scenario: Scenario
+    npcs: PolicySpec
+    origin: Origin
+    result: FlightResult
+
+
+FlyAll = Callable[[PolicySpec, Sequence[Scenario]], Iterator[FlightResult]]
+"""Flies scenarios among NPCs of a policy; the results come in order."""
+
+
+def flights_of(arm: Arm, plan: SearchPlan, count: int, fly_all: FlyAll) -> Iterator[SearchFlight]:
+    """Yield the flights of a search, generation by generation; who stops asking ends it."""
+    method, flown = arm.make(plan), 0
+    while flown < count:
         scenarios = list(method.ask())
         origins = getattr(method, "origins", ()) or [Origin(how="control")] * len(scenarios)
         results: list[FlightResult] = []
-        flights = fly_all(scenarios[: task.flights - flown])
-        for result, origin in zip(flights, origins, strict=False):
+        flights = fly_all(arm.npcs, scenarios[: count - flown])
+        for scenario, origin, result in zip(scenarios, origins, flights, strict=False):
             results.append(result)
             flown += 1
-            hit = bool(task.until) and re.search(task.until, result.signature) is not None
-            is_last = hit or flown == task.flights
-            yield {
-                **dict(zip(COLUMNS, task.key, strict=False)),
-                "flight": flown,
-                "how": origin.how,
-                "parents": " ".join(origin.parents),
-                "signature": result.signature,
-                "no_landing": result.verdict.no_landing or "",
-                "elapsed_s": round(result.elapsed_s, 3),
-                "is_last": int(is_last),
-            }
-            if is_last:
-                return
-        if method.learns:
+            yield SearchFlight(
+                number=flown, scenario=scenario, npcs=arm.npcs, origin=origin, result=result
+            )
+        if method.learns and flown < count:
             pairs = zip(scenarios, results, strict=True)
             method.tell([FlownScenario(scenario=each, result=result) for each, result in pairs])
+
+
+def rows_of(task: SearchTask, fly_all: FlyAll) -> Iterator[dict[str, Any]]:
+    """Yield the row of each flight, up to the first that matches."""
+    plan = plan_of(task.map, task.seed, task.flights)
+    for flight in flights_of(arm_named(task.arm), plan, task.flights, fly_all):
+        result = flight.result
+        hit = bool(task.until) and re.search(task.until, result.signature) is not None
+        is_last = hit or flight.number == task.flights
+        yield {
+            **dict(zip(COLUMNS, task.key, strict=False)),
+            "flight": flight.number,
+            "how": flight.origin.how,
+            "parents": " ".join(flight.origin.parents),
+            "signature": result.signature,
+            "no_landing": result.verdict.no_landing or "",
+            "elapsed_s": round(result.elapsed_s, 3),
+            "is_last": int(is_last),
+        }
+        if is_last:
+            return
 
 
 def run(task: SearchTask, table: ResultTable, pool: Executor) -> None:
@@ -127,8 +139,10 @@ def run(task: SearchTask, table: ResultTable, pool: Executor) -> None:
     if any(row["is_last"] == "1" for row in own):
         return
     known = {row["flight"] for row in own}
-    fly = functools.partial(fly_one, task.system, arm_named(task.arm).npcs)
-    fly_all = functools.partial(pool.map, fly)
+
+    def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[FlightResult]:
+        return pool.map(functools.partial(fly_one, task.system, npcs), scenarios)
+
     # A search that was interrupted is flown again, and its rows are the same.
     table.append(row for row in rows_of(task, fly_all) if str(row["flight"]) not in known)
 

@@ -37,14 +37,15 @@ class ResultTable:
         """Return the keys of all rows."""
         return {tuple(row[name] for name in self.key) for row in self.rows()}
 
-    def append(self, rows: Iterable[Mapping[str, Any]]) -> None:
+    def append(self, rows: Iterable[Mapping[str, Any]], *, quietly: bool = False) -> None:
         """Add rows at once, so that an interruption loses no finished row, and print them."""
         self._add_columns()
         with self.file.open("a", newline="") as file:
             writer = csv.DictWriter(file, self.columns, lineterminator="\n")
             for row in rows:
                 writer.writerow(row)
-                print(", ".join(f"{name} {value}" for name, value in row.items()), flush=True)
+                if not quietly:
+                    print(", ".join(f"{name} {value}" for name, value in row.items()), flush=True)
 
     def _add_columns(self) -> None:
         """Write the header of all columns, and the rows that are there below it."""

@@ -28,7 +28,7 @@ def arithmetic(scenario: Scenario) -> FlightResult:
     return stand_in(scenario, MAP, ORDINARY)
 
 
-def fly_all(scenarios: Sequence[Scenario]) -> Iterator[FlightResult]:
+def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[FlightResult]:
     return map(arithmetic, scenarios)
 
 

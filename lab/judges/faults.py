@@ -1,0 +1,276 @@
+"""Judge 1: how many flights a search takes to find a planted fault."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lab.arms import arm_named
+from lab.faults.catalogue import FAULTS, PLACEBO, fault_named
+from lab.faults.control import ControlSystem
+from lab.faults.fault import Fault, result_of
+from lab.judges.flights import named
+from lab.judges.intervals import Estimate, Values, mean_of, over_clusters
+from lab.one_search import flights_of, plan_of
+from lab.table import ResultTable, Row
+from pytest_garl.execution.result import FlightResult
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.npc_policy import PolicySpec
+
+FLIGHTS, MORE_FLIGHTS = 100, 400
+SEEDS, MORE_SEEDS = tuple(range(20, 25)), tuple(range(20, 23))
+ARMS, MORE_ARMS = ("random", "exploring+", "garl", "shuffled"), ("garl", "exploring+")
+OURS = "garl"
+TWIN_SHARES = (0.98, 0.99, 1.01, 1.02)
+"""The approach of a twin, as a share of that of the system."""
+LEAST_FAULTY, MOST_CONTROLS = 3, 1
+"""Of four twins of the faulty system so many must violate, and of those of the control at most."""
+WITHIN = (10, 25, 50, 100)
+TABLE = ResultTable(
+    file=Path("docs/judge-faults.csv"),
+    columns=(
+        *("arm", "fault", "seed", "flights", "map", "control", "found_at", "how", "signature"),
+        *("unconfirmed", "masked", "commit"),
+    ),
+    key=("arm", "fault", "seed", "flights"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultTask:
+    """One search for a fault by an arm."""
+
+    arm: str
+    fault: str
+    seed: int
+    flights: int = FLIGHTS
+
+    @property
+    def name(self) -> str:
+        """The name of its file."""
+        return named(arm=self.arm, fault=self.fault, seed=self.seed, flights=self.flights)
+
+    def row(self) -> dict[str, Any]:
+        """Search until the first confirmed find.
+
+        ``unconfirmed`` counts candidates that twins did not confirm, ``masked`` the violations that
+        the control shares.
+        """
+        fault, arm = fault_named(self.fault), arm_named(self.arm)
+        plan = plan_of(fault.map, self.seed, self.flights)
+        counts = {"unconfirmed": 0, "masked": 0}
+        row = {**dataclasses.asdict(self), "map": fault.map, "control": plan.population}
+        lost = {"found_at": None, "how": "", "signature": "", "told": "not found"}
+
+        def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[FlightResult]:
+            return (result_of(fault.faulty, each, npcs) for each in scenarios)
+
+        for flight in flights_of(arm, plan, self.flights, fly_all):
+            if not flight.result.verdict.violation:
+                continue
+            if result_of(fault.control, flight.scenario, flight.npcs).verdict.violation:
+                counts["masked"] += 1
+            elif not confirmed(fault, flight.scenario, flight.npcs):
+                counts["unconfirmed"] += 1
+            else:
+                found = {
+                    "found_at": flight.number,
+                    "how": flight.origin.how,
+                    "signature": flight.result.signature,
+                    "told": f"found in flight {flight.number}",
+                }
+                return {**row, **counts, **found}
+        return {**row, **counts, **lost}
+
+
+def confirmed(fault: Fault, scenario: Scenario, npcs: PolicySpec) -> bool:
+    """Whether twins of a candidate confirm it."""
+    return (
+        _violating(fault.faulty, scenario, npcs) >= LEAST_FAULTY
+        and _violating(fault.control, scenario, npcs) <= MOST_CONTROLS
+    )
+
+
+def _violating(system: Any, scenario: Scenario, npcs: PolicySpec) -> int:
+    results = (result_of(twin_of(system, share), scenario, npcs) for share in TWIN_SHARES)
+    return sum(result.verdict.violation for result in results)
+
+
+@functools.cache
+def twin_of(system: type[ControlSystem], share: float) -> type[ControlSystem]:
+    """Return the system with another speed of its approach."""
+    parameters = dataclasses.replace(
+        system.parameters, approach_mps=share * system.parameters.approach_mps
+    )
+    return type(f"{system.__name__}Twin", (system,), {"parameters": parameters})
+
+
+def tasks(
+    arms: Iterable[str], faults: Iterable[str], seeds: Iterable[int], flights: int
+) -> list[FaultTask]:
+    """Return the searches; all arms and faults of a seed come before the next one."""
+    names, kinds = list(faults), list(arms)
+    return [
+        FaultTask(arm=arm, fault=fault, seed=seed, flights=flights)
+        for seed in seeds
+        for fault in names
+        for arm in kinds
+    ]
+
+
+def missed(rows: Iterable[Row], arms: Iterable[str], seeds: Iterable[int]) -> list[FaultTask]:
+    """Return a longer search for each fault that an arm missed."""
+    wanted = {*map(str, seeds)}
+    return [
+        FaultTask(arm=row["arm"], fault=row["fault"], seed=int(row["seed"]), flights=MORE_FLIGHTS)
+        for row in rows
+        if row["flights"] == str(FLIGHTS) and not row["found_at"]
+        if row["arm"] in arms and row["seed"] in wanted
+    ]
+
+
+Found = Mapping[tuple[str, str, str], int]
+"""The flight that found a fault, by arm, fault and seed; a miss counts as all flights."""
+
+
+def report(rows: Sequence[Row]) -> str:
+    """Return the tables in Markdown; seeds that an arm has not flown wholly are left out."""
+    all_ = [row for row in rows if row["flights"] == str(FLIGHTS)]
+    short = [row for row in all_ if row["fault"] != PLACEBO.name]
+    if not short:
+        return "nothing is flown"
+    found: Found = {
+        (row["arm"], row["fault"], row["seed"]): int(row["found_at"] or FLIGHTS) for row in short
+    }
+    lost = {(row["arm"], row["fault"], row["seed"]) for row in short if not row["found_at"]}
+    arms = list(dict.fromkeys(row["arm"] for row in short))
+    control = int(short[0]["control"])
+    parts = [_shares(found, lost, arms, control)]
+    if OURS in arms:
+        parts += [_ratios(found, lost, [arm for arm in arms if arm != OURS], control)]
+    chance = [row for row in all_ if row["fault"] == PLACEBO.name]
+    parts += [_longer(rows), _misses(lost, arms), _placebo(chance), _commits(rows)]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _shares(found: Found, lost: set[Any], arms: Sequence[str], control: int) -> str:
+    lines = [
+        "Share of faults found, %, mean over seeds with Student's 95 % interval; flights to the "
+        f"find, of which the first {control} are the control.",
+        "",
+        f"| arm | searches | {' | '.join(f'within {each}' for each in WITHIN)} | flights |",
+        f"| --- | ---: |{' --- |' * len(WITHIN)} ---: |",
+    ]
+    for arm in arms:
+        own = [key for key in found if key[0] == arm]
+        cells = [
+            mean_of(
+                [
+                    float(np.mean([_in_time(found, lost, key, most) for key in own if key[2] == s]))
+                    for s in sorted({key[2] for key in own})
+                ]
+            ).text(0, 100)
+            for most in WITHIN
+        ]
+        flights = np.mean([found[key] for key in own])
+        lines.append(f"| {arm} | {len(own)} | {' | '.join(cells)} | {flights:.1f} |")
+    return "\n".join(lines)
+
+
+def _in_time(found: Found, lost: set[Any], key: tuple[str, str, str], most: int) -> bool:
+    return key not in lost and found[key] <= most
+
+
+def _ratios(found: Found, lost: set[Any], rivals: Sequence[str], control: int) -> str:
+    lines = [
+        f"{OURS} against each rival, paired by fault and seed, with 95 % intervals of a bootstrap "
+        "over seeds and families: flights as a multiple, and flights fewer.  After the control: "
+        "without what the control found, and without its flights.",
+        "",
+        "| rival | pairs | flights, times | flights fewer | pairs after the control | times "
+        "| fewer |",
+        "| --- | ---: | --- | --- | ---: | --- | --- |",
+    ]
+    for rival in rivals:
+        cells: list[str] = []
+        for after in (0, control):
+            own, other, families = paired(found, lost, rival, after)
+            count = int((~np.isnan(own)).sum())
+            if not count:
+                cells += ["0", "–", "–"]
+                continue
+            cells += [
+                str(count),
+                over_clusters(own, other, families).text(),
+                over_clusters(own, other, families, difference=True).text(1),
+            ]
+        lines.append(f"| {rival} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def paired(
+    found: Found, lost: set[Any], rival: str, after: int = 0
+) -> tuple[Values, Values, list[str]]:
+    """Return the flights of ours and of a rival, (faults, seeds), and the families of the faults.
+
+    Flights count from ``after`` on.  A pair is nan if one of them is not flown, or if one of them
+    found the fault before.
+    """
+    faults = [each for each in FAULTS if any(key[1] == each.name for key in found)]
+    seeds = sorted({key[2] for key in found})
+    tables = np.full((2, len(faults), len(seeds)), np.nan)
+    for i, fault in enumerate(faults):
+        for j, seed in enumerate(seeds):
+            keys = [(arm, fault.name, seed) for arm in (OURS, rival)]
+            if all(key in found and (key in lost or found[key] > after) for key in keys):
+                tables[:, i, j] = [found[key] - after for key in keys]
+    return tables[0], tables[1], [fault.family for fault in faults]
+
+
+def ratio_to(rows: Sequence[Row], rival: str) -> Estimate:
+    """Return the flights of ours as a multiple of those of a rival."""
+    found = {(r["arm"], r["fault"], r["seed"]): int(r["found_at"] or FLIGHTS) for r in rows}
+    return over_clusters(*paired(found, set(), rival))
+
+
+def _longer(rows: Sequence[Row]) -> str:
+    own = [row for row in rows if row["flights"] == str(MORE_FLIGHTS)]
+    lines = []
+    for arm in dict.fromkeys(row["arm"] for row in own):
+        all_ = [row for row in own if row["arm"] == arm]
+        hits = sum(bool(row["found_at"]) for row in all_)
+        lines.append(
+            f"In {MORE_FLIGHTS} flights {arm} found {hits} of the {len(all_)} faults that it had "
+            f"missed in {FLIGHTS} flights of these seeds."
+        )
+    return "\n".join(lines)
+
+
+def _misses(lost: set[tuple[str, str, str]], arms: Sequence[str]) -> str:
+    lines = []
+    for arm in arms:
+        seeds: dict[str, int] = {}
+        for each in lost:
+            if each[0] == arm:
+                seeds[each[1]] = seeds.get(each[1], 0) + 1
+        named_ = ", ".join(f"{fault} ({count})" for fault, count in sorted(seeds.items()))
+        lines.append(f"Missed by {arm}, with the number of seeds: {named_ or 'none'}.")
+    return "\n".join(lines)
+
+
+def _placebo(rows: Sequence[Row]) -> str:
+    """Return in how many searches the system without a fault was found."""
+    if not rows:
+        return ""
+    hits = sum(bool(row["found_at"]) for row in rows)
+    return f"Twins confirmed a find of the placebo, which has no fault, in {hits} of {len(rows)}."
+
+
+def _commits(rows: Sequence[Row]) -> str:
+    return f"Flown at {', '.join(sorted({row['commit'] for row in rows}))}."

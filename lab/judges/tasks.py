@@ -1,0 +1,126 @@
+"""Tasks of a judge: one file for each, flown in processes of the lowest priority."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import time
+import traceback
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Protocol
+
+from lab.table import ResultTable
+from pytest_garl import cpu_dispatch
+
+FOLDER = Path(".garl/judges")
+LOWEST_PRIORITY = 19
+
+
+class Task(Protocol):
+    """One search, or one set of flights, whose row does not depend on any other."""
+
+    @property
+    def name(self) -> str:
+        """The name of its file, and what it is called."""
+
+    def row(self) -> dict[str, Any]:
+        """Fly it in this process; return its row."""
+
+
+def file_of(folder: Path, task: Task) -> Path:
+    """Return the file of a task."""
+    return folder / f"{task.name}.json"
+
+
+def run(tasks: Sequence[Task], folder: Path, pool_of: Callable[[], Executor]) -> int:
+    """Fly the tasks that have no file, and tell after each how much time is left.
+
+    Returns how many have no file afterwards.  The pool's processes fly one task each at a time.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    missing = [task for task in tasks if not file_of(folder, task).is_file()]
+    print(f"{len(tasks) - len(missing)} of {len(tasks)} are flown, in {folder}", flush=True)
+    cpu_dispatch.pin()
+    commit, began = present_commit(), time.monotonic()
+    with pool_of() as pool:
+        flying = {pool.submit(task.row): task for task in missing}
+        try:
+            for done, future in enumerate(as_completed(flying), start=1):
+                task, error = flying[future], future.exception()
+                if error is None:
+                    row = future.result()
+                    _write(file_of(folder, task), {**row, "commit": commit})
+                    told = row["told"]
+                else:
+                    # The others are worth hours.
+                    told = "".join(traceback.format_exception(error))
+                passed_s = time.monotonic() - began
+                left_s = passed_s / done * (len(missing) - done)
+                print(
+                    f"[{done}/{len(missing)}] {task.name}: {told}; "
+                    f"{_hours(passed_s)} so far, about {_hours(left_s)} left",
+                    flush=True,
+                )
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            print("interrupted: the same command continues", flush=True)
+    return sum(not file_of(folder, task).is_file() for task in tasks)
+
+
+def nice_pool(jobs: int) -> Executor:
+    """Return processes that let everything else on the machine go first."""
+    return ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=be_nice)
+
+
+def be_nice() -> None:
+    """Let everything else on the machine go first, and compute with one thread."""
+    import cv2
+
+    os.nice(LOWEST_PRIORITY)
+    cv2.setNumThreads(1)
+
+
+def collect(tasks: Iterable[Task], folder: Path, table: ResultTable) -> None:
+    """Add the rows of the files to a table that lacks them."""
+    known, rows = table.keys(), []
+    for task in tasks:
+        file = file_of(folder, task)
+        if file.is_file():
+            row = json.loads(file.read_text())
+            if tuple(str(row[name]) for name in table.key) not in known:
+                rows.append({name: _cell(row[name]) for name in table.columns})
+    if rows:
+        table.append(rows, quietly=True)
+
+
+def present_commit() -> str:
+    """Return the commit of the code, with a plus if something is changed; empty without git."""
+
+    def told(*words: str) -> str:
+        return subprocess.run(
+            ("git", *words), capture_output=True, text=True, check=False
+        ).stdout.strip()
+
+    changed = told("status", "--porcelain", "--untracked-files=no")
+    return told("rev-parse", "--short=10", "HEAD") + ("+" if changed else "")
+
+
+def _write(file: Path, row: dict[str, Any]) -> None:
+    """Write a file in one step: a file that is there is whole."""
+    part = file.with_suffix(".part")
+    part.write_text(json.dumps(row, indent=1) + "\n")
+    part.replace(file)
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, list | dict):
+        return json.dumps(value)
+    return "" if value is None else str(value)
+
+
+def _hours(seconds: float) -> str:
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
