@@ -11,6 +11,8 @@ BIN := $(VENV)/bin
 FLIES := $(VENV)/.flies
 READY := $(VENV)/.installed
 CLUSTERS := $(VENV)/.clusters
+ROS := $(VENV)/ros
+ROS_PACKAGES := rclpy rmw-fastrtps-cpp rmw-security-common rosgraph-msgs sensor-msgs geometry-msgs std-msgs
 OTHER := $(VENV)/.other
 CHECKS := $(VENV)/checks.log
 SMOKE := .garl/experiment-smoke
@@ -76,6 +78,9 @@ test-long: $(READY)  ## the tutorial, 50 kills, 154 misbehaving systems, more fu
 test-ray: $(CLUSTERS)  ## the tests that start Ray clusters: minutes, so not part of `test`
 	$(BIN)/pytest -m ray tests
 
+test-ros2: $(READY) $(ROS)/.installed  ## the tests that run a ROS 2 node: 394 MB of wheels for Linux on x86-64
+	ROS_PYTHON=$(ROS)/bin/python $(BIN)/pytest tests/external/test_ros2.py
+
 bench: $(READY)  ## measure frames, flights and the plugin's overhead
 	$(BIN)/python -m lab.benchmarks
 
@@ -115,4 +120,10 @@ $(OTHER): pyproject.toml constraints.txt
 # Only the tests of clusters need Ray.
 $(CLUSTERS): $(READY)
 	$(INSTALL) -e '.[dev,train,ray]'
+	touch $@
+
+# ROS 2 has its own environment, as a user's node has: it flies beside pytest's, not in it.
+$(ROS)/.installed: | $(READY)
+	$(PYTHON) -m venv $(ROS)
+	$(ROS)/bin/pip install --quiet --disable-pip-version-check $(addprefix ros-,$(ROS_PACKAGES)) numpy
 	touch $@
