@@ -11,7 +11,7 @@ and for ``exploring``, which knows no moments.
     rival of the search before events and stories could wait for moments.  A work tree of that
     commit flies it (``lab/frozen.py``).
 `exploring+`
-    Stratified scenarios with moments and the director that ships; no children, no model.
+    Stratified scenarios with moments and the same director as `garl`; no children, no model.
 `garl`
     The search as it ships.
 `shuffled`
@@ -20,6 +20,8 @@ and for ``exploring``, which knows no moments.
     `garl`, but the rule of time to go lets NPCs begin; `rule@1.5` has a margin of 1.5 s.
 `gene`
     `garl`, but the begin of each NPC is a gene: no story waits for a decision.
+`shipped`
+    `garl`, but its director keeps the weights that ship, and learns nothing of the system.
 `untrained`
     `garl`, but a network with random weights lets NPCs begin.
 """
@@ -86,11 +88,15 @@ def without_decisions(genome: Genome) -> Genome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arm:
-    """One arm: ``make`` starts its search method, ``npcs`` moves the NPCs."""
+    """One arm: ``make`` starts its search method, ``npcs`` moves the NPCs.
+
+    ``learns`` says whether the director learns from the flights.
+    """
 
     name: str
     make: Callable[[SearchPlan], Method]
     npcs: PolicySpec
+    learns: bool
 
 
 def _garl(plan: SearchPlan, parameters: GarlParameters | None = None) -> Method:
@@ -108,6 +114,7 @@ _MADE: dict[str, Callable[[SearchPlan], Method]] = {
     "shuffled": functools.partial(_garl, parameters=GarlParameters(shuffled=True)),
     "rule": _garl,
     "gene": _as_gene,
+    "shipped": _garl,
     "untrained": _garl,
 }
 FROZEN = "exploring"
@@ -124,4 +131,5 @@ def arm_named(name: str) -> Arm:
         )
     if kind not in _MADE or (margin and kind != "rule"):
         raise GarlError(f"unknown arm {name!r}; expected one of {', '.join(ARMS)}, rule@SECONDS")
-    return Arm(name=name, make=_MADE[kind], npcs=decided_by(name))
+    learns = kind not in ("rule", "untrained", "shipped", "gene")
+    return Arm(name=name, make=_MADE[kind], npcs=decided_by(name), learns=learns)

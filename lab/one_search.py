@@ -15,6 +15,7 @@ import argparse
 import functools
 import os
 import re
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass
@@ -29,6 +30,9 @@ from pytest_garl.errors import GarlError
 from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.execution.reference import system_named
 from pytest_garl.execution.result import FlightResult, Origin
+from pytest_garl.flight.flight import Flight
+from pytest_garl.landing_system import Airframe, airframe_of
+from pytest_garl.npcs.own_director import OwnDirector
 from pytest_garl.plugin.options import population
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.maps.loading import load_map
@@ -62,13 +66,26 @@ class SearchTask:
         return self.system, self.map, self.arm, str(self.seed)
 
 
-def fly_one(system: str, npcs: PolicySpec, scenario: Scenario) -> FlightResult:
-    """Fly a landing system through a scenario; return the judged result."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flown:
+    """A judged flight, with its record if a director is to learn from it."""
+
+    result: FlightResult
+    record: Flight | None = None
+
+
+def fly_one(system: str, npcs: PolicySpec, scenario: Scenario) -> Flown:
+    """Fly a landing system through a scenario."""
     import cv2
 
     cv2.setNumThreads(1)
-    flight = fly(scenario, system_named(system), npcs, map=load_map(scenario.map))
-    return judged(flight, DEFAULT_LIMITS)
+    return flown_by(system_named(system), npcs, scenario)
+
+
+def flown_by(system: Any, npcs: PolicySpec, scenario: Scenario) -> Flown:
+    """Fly a landing system's class through a scenario."""
+    flight = fly(scenario, system, npcs, map=load_map(scenario.map))
+    return Flown(result=judged(flight, DEFAULT_LIMITS), record=flight)
 
 
 def plan_of(map_name: str, seed: int, flights: int) -> SearchPlan:
@@ -89,33 +106,54 @@ class SearchFlight:
     result: FlightResult
 
 
-FlyAll = Callable[[PolicySpec, Sequence[Scenario]], Iterator[FlightResult]]
-"""Flies scenarios among NPCs of a policy; the results come in order."""
+FlyAll = Callable[[PolicySpec, Sequence[Scenario]], Iterator[Flown]]
+"""Flies scenarios among NPCs of a policy; the flights come in order."""
 
 
-def flights_of(arm: Arm, plan: SearchPlan, count: int, fly_all: FlyAll) -> Iterator[SearchFlight]:
-    """Yield the flights of a search, generation by generation; who stops asking ends it."""
-    method, flown = arm.make(plan), 0
-    while flown < count:
+def flights_of(
+    arm: Arm, plan: SearchPlan, count: int, fly_all: FlyAll, airframe: Airframe | None = None
+) -> Iterator[SearchFlight]:
+    """Yield the flights of a search, generation by generation; who stops asking ends it.
+
+    With the airframe of the landing system the arm's director learns from the flights, if it does,
+    one generation behind, as in a run of pytest.
+    """
+    method, number = arm.make(plan), 0
+    director = None
+    if airframe is not None and method.learns and arm.learns:
+        director = OwnDirector(plan.map, airframe)
+    untaught: deque[list[tuple[Scenario, Flight]]] = deque()
+    npcs = arm.npcs
+    while number < count:
         scenarios = list(method.ask())
         origins = getattr(method, "origins", ()) or [Origin(how="control")] * len(scenarios)
-        results: list[FlightResult] = []
-        flights = fly_all(arm.npcs, scenarios[: count - flown])
-        for scenario, origin, result in zip(scenarios, origins, flights, strict=False):
-            results.append(result)
-            flown += 1
+        flown: list[Flown] = []
+        flights = fly_all(npcs, scenarios[: count - number])
+        for scenario, origin, flight in zip(scenarios, origins, flights, strict=False):
+            flown.append(flight)
+            number += 1
             yield SearchFlight(
-                number=flown, scenario=scenario, npcs=arm.npcs, origin=origin, result=result
+                number=number, scenario=scenario, npcs=npcs, origin=origin, result=flight.result
             )
-        if method.learns and flown < count:
-            pairs = zip(scenarios, results, strict=True)
-            method.tell([FlownScenario(scenario=each, result=result) for each, result in pairs])
+        if number == count:
+            return
+        pairs = list(zip(scenarios, flown, strict=True))
+        if method.learns:
+            method.tell([FlownScenario(scenario=each, result=f.result) for each, f in pairs])
+        if director is not None:
+            is_first = number == len(scenarios)
+            untaught.append([(each, f.record) for each, f in pairs if f.record is not None])
+            while len(untaught) > (0 if is_first or not method.overlaps else 1):
+                director.learn(untaught.popleft())
+            npcs = arm.npcs.directed_by(director.text)
 
 
-def rows_of(task: SearchTask, fly_all: FlyAll) -> Iterator[dict[str, Any]]:
+def rows_of(
+    task: SearchTask, fly_all: FlyAll, airframe: Airframe | None = None
+) -> Iterator[dict[str, Any]]:
     """Yield the row of each flight, up to the first that matches."""
     plan = plan_of(task.map, task.seed, task.flights)
-    for flight in flights_of(arm_named(task.arm), plan, task.flights, fly_all):
+    for flight in flights_of(arm_named(task.arm), plan, task.flights, fly_all, airframe):
         result = flight.result
         hit = bool(task.until) and re.search(task.until, result.signature) is not None
         is_last = hit or flight.number == task.flights
@@ -133,18 +171,20 @@ def rows_of(task: SearchTask, fly_all: FlyAll) -> Iterator[dict[str, Any]]:
             return
 
 
-def run(task: SearchTask, table: ResultTable, pool: Executor) -> None:
+def run(
+    task: SearchTask, table: ResultTable, pool: Executor, airframe: Airframe | None = None
+) -> None:
     """Append the rows of a search, unless the table has all of them."""
     own = [row for row in table.rows() if tuple(row[name] for name in COLUMNS[:4]) == task.key]
     if any(row["is_last"] == "1" for row in own):
         return
     known = {row["flight"] for row in own}
 
-    def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[FlightResult]:
+    def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[Flown]:
         return pool.map(functools.partial(fly_one, task.system, npcs), scenarios)
 
     # A search that was interrupted is flown again, and its rows are the same.
-    table.append(row for row in rows_of(task, fly_all) if str(row["flight"]) not in known)
+    table.append(row for row in rows_of(task, fly_all, airframe) if str(row["flight"]) not in known)
 
 
 def main() -> None:
@@ -168,10 +208,10 @@ def main() -> None:
     try:
         # Whoever cannot be flown is told before a process starts.
         re.compile(named["until"])
-        system_named(named["system"])
+        airframe = airframe_of(system_named(named["system"]))
         load_map(named["map"])
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            run(SearchTask(**named), table, pool)
+            run(SearchTask(**named), table, pool, airframe)
     except (GarlError, re.error) as error:
         parser.error(str(error))
 

@@ -4,11 +4,11 @@
 
 prints for each search how many of its flights are children, whether the flights that they name as
 parents were flown before and have their conditions and NPCs, and in how many of the flights with an
-NPC that knows of the UAV the learned director decides.  Then the package's own breeder breeds the
-search again, on a copy of the ledger, from the results that it holds: all scenarios must come out
-as they were flown, with pymoo.  The exit status is 1 if something of that does not hold, or if less
-than half of the flights after the control are children, or if the director decides in less than
-half of the flights with an NPC that knows of the UAV.
+NPC that knows of the UAV the learned director decides, and with which weights.  Then the package's
+own breeder breeds the search again, on a copy of the ledger, from the results that it holds: all
+scenarios must come out as they were flown, with pymoo.  The exit status is 1 if something of that
+does not hold, or if less than half of the flights after the control are children, or if the
+director decides in less than half of the flights with an NPC that knows of the UAV.
 """
 
 from __future__ import annotations
@@ -50,8 +50,9 @@ class SearchCount:
     """What one search bred: numbers of flights.
 
     ``true_children`` name at least two parents, all of them flown in earlier generations, and have
-    of each a condition or an NPC with all of its values.  ``bred_again`` says whether the same
-    scenarios were bred from the results, or else what came out.
+    of each a condition or an NPC with all of its values.  In ``by_own`` of the flights in which the
+    director decides it has weights that it learned in this search.  ``bred_again`` says whether the
+    same scenarios were bred from the results, or else what came out.
     """
 
     name: str
@@ -60,6 +61,7 @@ class SearchCount:
     children: int
     true_children: int
     movers: MoverRecord
+    by_own: int
     bred_again: str
 
     @property
@@ -93,6 +95,7 @@ def _count(ledger: Ledger, search: str) -> SearchCount:
     made = _origins(ledger, search, flights)
     known = {flight.id.slot_id: flight for flight in flights}
     bred = [(flight, origin) for flight, origin in made if origin.how == "bred"]
+    taught = [e for e in flights if ledger.facts.director(search, e.id.slot.generation)]
     plan = SearchPlan(
         map=map, genome=genome, seed=int(facts["seed"]), population=int(facts["population"])
     )
@@ -103,6 +106,7 @@ def _count(ledger: Ledger, search: str) -> SearchCount:
         children=len(bred),
         true_children=sum(_is_child(*each, known, genome) for each in bred),
         movers=mover_record((flight, job.npcs) for flight in flights) or NO_NPCS,
+        by_own=(mover_record((flight, job.npcs) for flight in taught) or NO_NPCS).directed,
         bred_again=_bred_again(ledger, search, str(facts["method"]), plan),
     )
 
@@ -185,8 +189,9 @@ def report(counts: Sequence[SearchCount], has_pymoo: bool) -> tuple[str, bool]:
             f"  children with conditions or NPCs of two or more flights, all flown in earlier "
             f"generations: {each.true_children} of {each.children}",
             f"  the director decides in {movers.directed} of {movers.interfering} flights with an "
-            f"NPC that knows of the UAV; NPCs moved by it {movers.director}, by the rule "
-            f"{movers.rule}, by genes {movers.gene}",
+            f"NPC that knows of the UAV, with weights learned in this search in {each.by_own}, "
+            f"with those that ship in {movers.directed - each.by_own}; NPCs begin by it "
+            f"{movers.director}, by the rule {movers.rule}, by genes {movers.gene}",
             f"  bred again from the results: {each.bred_again or 'the same scenarios'}",
         ]
         if each.bred_again:

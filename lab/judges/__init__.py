@@ -46,7 +46,8 @@ weather, everything else nominal, on each system and each map, 100 flights an ar
 
 - All arms fly the same scenarios, in generations of ten; in the arm ``gene`` the NPC begins at a
   moment and a delay that were drawn as the domain draws them, in all others the arm's director
-  decides.  Types of NPCs take turns.
+  decides.  That of ``garl`` learns from the flights, one generation behind; that of ``shipped``
+  does not.  Types of NPCs take turns.
 - A collision with the NPC *counts* if the case that the package makes of it gates: its neighbours
   fail as well, an escape exists, and the body was in view for 0.3 s before the escape begins.  A
   contact within a second after the touchdown counts for nobody, nor one less than a second before

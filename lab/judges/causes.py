@@ -21,15 +21,16 @@ from lab.arms import BEFORE_MOMENTS, FROZEN, arm_named
 from lab.judges.flights import MAPS, SYSTEMS, OwnFlights, moved_twins, named
 from lab.judges.intervals import mean_of, over_pairs, p_of_signs
 from lab.judges.tasks import FOLDER
-from lab.one_search import flights_of, plan_of
+from lab.one_search import Flown, flights_of, plan_of
 from lab.table import ResultTable, Row
 from pytest_garl.cases.case_flights import find_colliding_object
 from pytest_garl.cases.shrink import shrink
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
-from pytest_garl.execution.result import FlightResult
+from pytest_garl.execution.reference import system_named
 from pytest_garl.flight.flight_file import load
+from pytest_garl.landing_system import airframe_of
 from pytest_garl.npcs.domain_policy import GRADED
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.conditions import active_conditions, unread_groups, without_groups
@@ -217,16 +218,17 @@ class CausesTask:
                     flown.record.unlink(missing_ok=True)
             return
         arm, plan = arm_named(self.arm), plan_of(self.map, self.seed, self.flights)
+        airframe = airframe_of(system_named(SYSTEMS[self.system]))
         latest: list[CompletedFlight] = []
 
-        def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[FlightResult]:
+        def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[Flown]:
             own = dataclasses.replace(job, npcs=npcs)
             for scenario in scenarios:
                 latest[:] = [fly(own, scenario)]
-                yield latest[0].result
+                yield Flown(result=latest[0].result, record=load(latest[0].record))
                 latest[0].record.unlink(missing_ok=True)
 
-        for flight in flights_of(arm, plan, self.flights, fly_all):
+        for flight in flights_of(arm, plan, self.flights, fly_all, airframe):
             if flight.result.verdict.violation:
                 yield Violating(
                     number=flight.number,

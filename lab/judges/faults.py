@@ -14,12 +14,12 @@ import numpy as np
 from lab.arms import arm_named
 from lab.faults.catalogue import FAULTS, PLACEBO, fault_named
 from lab.faults.control import ControlSystem
-from lab.faults.fault import Fault, result_of
+from lab.faults.fault import Fault
 from lab.judges.flights import named
 from lab.judges.intervals import Estimate, Values, mean_of, over_clusters
-from lab.one_search import flights_of, plan_of
+from lab.one_search import Flown, flights_of, flown_by, plan_of
 from lab.table import ResultTable, Row
-from pytest_garl.execution.result import FlightResult
+from pytest_garl.landing_system import airframe_of
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
 
@@ -68,13 +68,14 @@ class FaultTask:
         row = {**dataclasses.asdict(self), "map": fault.map, "control": plan.population}
         lost = {"found_at": None, "how": "", "signature": "", "told": "not found"}
 
-        def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[FlightResult]:
-            return (result_of(fault.faulty, each, npcs) for each in scenarios)
+        def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[Flown]:
+            return (flown_by(fault.faulty, npcs, each) for each in scenarios)
 
-        for flight in flights_of(arm, plan, self.flights, fly_all):
+        airframe = airframe_of(fault.faulty)
+        for flight in flights_of(arm, plan, self.flights, fly_all, airframe):
             if not flight.result.verdict.violation:
                 continue
-            if result_of(fault.control, flight.scenario, flight.npcs).verdict.violation:
+            if violates(fault.control, flight.npcs, flight.scenario):
                 counts["masked"] += 1
             elif not confirmed(fault, flight.scenario, flight.npcs):
                 counts["unconfirmed"] += 1
@@ -98,8 +99,12 @@ def confirmed(fault: Fault, scenario: Scenario, npcs: PolicySpec) -> bool:
 
 
 def _violating(system: Any, scenario: Scenario, npcs: PolicySpec) -> int:
-    results = (result_of(twin_of(system, share), scenario, npcs) for share in TWIN_SHARES)
-    return sum(result.verdict.violation for result in results)
+    return sum(violates(twin_of(system, share), npcs, scenario) for share in TWIN_SHARES)
+
+
+def violates(system: Any, npcs: PolicySpec, scenario: Scenario) -> bool:
+    """Whether a landing system violates a property in a scenario."""
+    return flown_by(system, npcs, scenario).result.verdict.violation
 
 
 @functools.cache

@@ -12,19 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from lab.arms import DOMAIN, Arm, arm_named
+from lab.arms import DOMAIN, arm_named
 from lab.judges.flights import MAPS, SYSTEMS, OwnFlights, named
 from lab.judges.intervals import over_pairs
-from lab.one_search import flights_of
+from lab.one_search import Flown, flights_of
 from lab.table import ResultTable, Row, share
 from pytest_garl.cases.case_request import CaseRequest
 from pytest_garl.cases.investigation import build_case
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
-from pytest_garl.execution.result import FlightResult
+from pytest_garl.execution.reference import system_named
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
 from pytest_garl.flight.thresholds import feet_height_m
+from pytest_garl.landing_system import airframe_of
 from pytest_garl.npcs.domain_policy import GRADED
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
@@ -39,7 +40,7 @@ from pytest_garl.simulation.npc_policy import PolicySpec
 
 FLIGHTS, GENERATION = 100, 10
 SEEDS = (20,)
-ARMS = ("gene", "rule", "untrained", "garl")
+ARMS = ("gene", "rule", "untrained", "shipped", "garl")
 OURS = "garl"
 CASE_FLIGHTS = 12
 NEAR_TOUCHDOWN_S = 1.0
@@ -84,10 +85,10 @@ def scenario_of(map_name: str, seed: int, number: int, *, as_gene: bool) -> Scen
 
 
 class GivenScenarios:
-    """Asks for given scenarios, generation by generation."""
+    """Asks for given scenarios, generation by generation, as a search that overlaps does."""
 
     learns = True
-    overlaps = False
+    overlaps = True
 
     def __init__(self, scenarios: Sequence[Scenario]) -> None:
         self._left = iter(scenarios)
@@ -147,20 +148,21 @@ class PreventableTask:
             scenario_of(self.map, self.seed, number, as_gene=self.arm == "gene")
             for number in range(self.flights)
         ]
-        given = Arm(name=arm.name, make=lambda plan: GivenScenarios(scenarios), npcs=arm.npcs)
+        given = dataclasses.replace(arm, make=lambda plan: GivenScenarios(scenarios))
         map = load_map(self.map)
         plan = SearchPlan(
             map=map, genome=genome_of(DOMAIN, map), seed=self.seed, population=GENERATION
         )
+        airframe = airframe_of(system_named(SYSTEMS[self.system]))
         latest: list[CompletedFlight] = []
 
-        def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[FlightResult]:
+        def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[Flown]:
             for scenario in scenarios:
                 latest[:] = [fly(dataclasses.replace(job, npcs=npcs), scenario)]
-                yield latest[0].result
+                yield Flown(result=latest[0].result, record=load(latest[0].record))
                 latest[0].record.unlink(missing_ok=True)
 
-        for flight in flights_of(given, plan, self.flights, fly_all):
+        for flight in flights_of(given, plan, self.flights, fly_all, airframe):
             decided = dict(flight.result.decided)
             yield flight.scenario.replace(decided), latest[0]
 

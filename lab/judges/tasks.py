@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 from lab.table import ResultTable
 from pytest_garl import cpu_dispatch
+from pytest_garl.execution.processes import end_with_parent
 
 FOLDER = Path(".garl/judges")
 LOWEST_PRIORITY = 19
@@ -73,13 +74,16 @@ def run(tasks: Sequence[Task], folder: Path, pool_of: Callable[[], Executor]) ->
 
 def nice_pool(jobs: int) -> Executor:
     """Return processes that let everything else on the machine go first."""
-    return ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=be_nice)
+    return ProcessPoolExecutor(
+        jobs, mp_context=get_context("spawn"), initializer=be_nice, initargs=(os.getpid(),)
+    )
 
 
-def be_nice() -> None:
-    """Let everything else on the machine go first, and compute with one thread."""
+def be_nice(parent: int) -> None:
+    """Let everything else on the machine go first, compute with one thread, end with the parent."""
     import cv2
 
+    end_with_parent(parent)
     os.nice(LOWEST_PRIORITY)
     cv2.setNumThreads(1)
 

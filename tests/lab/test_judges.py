@@ -22,7 +22,7 @@ from lab.judges.faults import FaultTask, twin_of
 from lab.judges.flights import OwnFlights
 from lab.judges.intervals import Estimate, mean_of, over_clusters, over_pairs, p_of_signs
 from lab.judges.preventable import AT_DECISION, is_near_touchdown, scenario_of
-from lab.one_search import plan_of
+from lab.one_search import Flown, plan_of
 from lab.table import ResultTable
 from pytest_garl import Land, Mission, Observation
 from pytest_garl.execution.job import FlightJob
@@ -101,10 +101,11 @@ def test_a_task_is_flown_once_and_a_failure_ends_no_other(
 def answering(monkeypatch: pytest.MonkeyPatch, fails: Callable[[Any, Scenario], bool]) -> None:
     """Let ``fails(system, scenario)`` say which flights violate a property."""
 
-    def result_of(system: Any, scenario: Scenario, npcs: object) -> FlightResult:
-        return flight_result("off", primary="distance") if fails(system, scenario) else OK
+    def flown_by(system: Any, npcs: object, scenario: Scenario) -> Flown:
+        bad = flight_result("off", primary="distance")
+        return Flown(result=bad if fails(system, scenario) else OK)
 
-    monkeypatch.setattr(faults, "result_of", result_of)
+    monkeypatch.setattr(faults, "flown_by", flown_by)
 
 
 OK = flight_result()

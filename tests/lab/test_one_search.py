@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 
 from lab import one_search
-from lab.one_search import COLUMNS, SearchTask, rows_of, run
+from lab.arms import arm_named
+from lab.one_search import COLUMNS, Flown, SearchTask, flights_of, plan_of, rows_of, run
 from lab.stand_in import stand_in
 from lab.stand_in_way import ORDINARY
 from lab.table import ResultTable
+from pytest_garl import Airframe
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -28,8 +30,8 @@ def arithmetic(scenario: Scenario) -> FlightResult:
     return stand_in(scenario, MAP, ORDINARY)
 
 
-def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[FlightResult]:
-    return map(arithmetic, scenarios)
+def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[Flown]:
+    return (Flown(result=arithmetic(each)) for each in scenarios)
 
 
 def test_a_search_has_a_row_for_each_flight_and_children_name_their_parents() -> None:
@@ -60,9 +62,9 @@ def test_a_search_goes_on_where_its_table_ends(
 ) -> None:
     flown: list[Scenario] = []
 
-    def fly_one(system: str, npcs: PolicySpec, scenario: Scenario) -> FlightResult:
+    def fly_one(system: str, npcs: PolicySpec, scenario: Scenario) -> Flown:
         flown.append(scenario)
-        return arithmetic(scenario)
+        return Flown(result=arithmetic(scenario))
 
     monkeypatch.setattr(one_search, "fly_one", fly_one)
     whole = ResultTable(file=tmp_path / "whole.csv", columns=COLUMNS, key=COLUMNS[:5])
@@ -77,3 +79,33 @@ def test_a_search_goes_on_where_its_table_ends(
         flown.clear()
         go(whole)
     assert not flown
+
+
+class Learner:
+    """A director that says from how many generations it has learned."""
+
+    def __init__(self, *about: object) -> None:
+        self.generations = 0
+
+    def learn(self, flights: object) -> None:
+        self.generations += 1
+
+    @property
+    def text(self) -> str:
+        return f"time-to-go {self.generations} 0"
+
+
+@pytest.mark.parametrize(("arm", "learned"), [("garl", ["0", "1", "1", "2", "3"]), ("shipped", [])])
+def test_a_director_learns_one_generation_behind(
+    arm: str, learned: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(one_search, "OwnDirector", Learner)
+    directors = list[str]()
+
+    def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[Flown]:
+        directors.append(str(dict(npcs.arguments).get("director", "time-to-go 0 0")))
+        return (Flown(result=arithmetic(each)) for each in scenarios)
+
+    flights = list(flights_of(arm_named(arm), plan_of("court", 301, 40), 40, fly_all, Airframe()))
+    assert [flight.number for flight in flights] == [*range(1, 41)]
+    assert [each.split()[1] for each in directors] == (learned or ["0"] * 5)

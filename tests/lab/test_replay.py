@@ -75,7 +75,7 @@ def test_children_of_a_search_are_counted_checked_and_bred_again(tmp_path: Path)
     assert (found.name, found.control) == ("Stack on court", SIZE)
     assert found.stratified + found.children == BUDGET - SIZE
     assert found.true_children == found.children >= found.after_control / 2
-    assert found.movers.interfering > 0
+    assert found.movers.interfering > 0 == found.by_own
     assert found.bred_again == ""
     assert path.read_bytes() == before
 
@@ -102,6 +102,15 @@ def test_a_ledger_with_other_scenarios_is_not_bred_again(tmp_path: Path) -> None
     assert "bred in another way" in found.bred_again
 
 
+def test_weights_that_a_search_learned_are_told(tmp_path: Path) -> None:
+    path = searched(tmp_path, "garl")
+    ledger = Ledger(path)
+    ledger.facts.note_director("s", 1, "time-to-go 0 0")
+    ledger.close()
+    (found,) = count(path)
+    assert 0 < found.by_own < found.movers.directed
+
+
 def test_a_method_without_children_does_not_hold(tmp_path: Path) -> None:
     (found,) = count(searched(tmp_path, "random"))
     assert (found.control, found.children, found.bred_again) == (0, 0, "")
@@ -121,9 +130,12 @@ def test_the_director_must_decide_in_half_of_the_flights(directed: int, expected
         children=6,
         true_children=6,
         movers=movers,
+        by_own=2,
         bred_again="",
     )
-    assert report([found], has_pymoo=True)[1] is expected
+    text, holds = report([found], has_pymoo=True)
+    assert holds is expected
+    assert f"in this search in 2, with those that ship in {directed - 2};" in text
 
 
 def test_a_missing_ledger_is_named(tmp_path: Path) -> None:
