@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
+import re
 import select
 import signal
 import subprocess
@@ -25,6 +26,8 @@ SAID_BYTES = 4096
 """How much of what a program wrote to stderr is kept: its end says why it died."""
 ENDING_S = 1.0
 """How long a program may take to end when its stdin is closed; then it is killed."""
+REASON = re.compile(r"^(?:[\w.]*(?:Error|Exception)\b.*|\s*what\(\):.*)$", re.MULTILINE)
+"""What Python and C++ write of an exception that nobody has caught."""
 QUIET_S = 2.0
 """After so much time without an answer it is said on stderr what is waited for: if the call then
 takes too long, the report of it has that line."""
@@ -162,7 +165,9 @@ class Child:
         status = self._status()
         how = f"signal {-status}" if status < 0 else f"exit status {status}"
         name = f" ({signal.Signals(-status).name})" if -status in {*signal.Signals} else ""
-        message = f"ended with {how}{name} before it answered {what}"
+        reasons = REASON.findall(self.said)
+        reason = f": {shortened(reasons[-1].strip(), 300)}" if reasons else ""
+        message = f"ended with {how}{name} before it answered {what}{reason}"
         return self.failure("died", how.replace(" ", "-"), message)
 
     def _status(self) -> int:

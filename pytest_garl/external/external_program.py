@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -17,6 +18,8 @@ from pytest_garl.messages import printable, shown
 from pytest_garl.program import ProgramSystem
 
 T = TypeVar("T")
+INTERPRETER = re.compile(r"(python|ruby|perl|node|java|lua|env|sh|bash|nice|ros2|stdbuf)[\d.]*")
+"""What runs the program that gives a command its name."""
 
 
 class ExternalProgram(ProgramSystem):
@@ -138,8 +141,10 @@ class RunningProgram:
 
 
 def _name_of(command: Sequence[str]) -> str:
-    """Return the name of the first file of a command that is no interpreter, as an identifier."""
-    files = [word for word in command if "/" in word or Path(word).suffix]
-    stem = Path((files or command)[0]).stem
+    """Return the name of what a command runs, without the interpreter that runs it."""
+    words = [word for word in command if not word.startswith("-")]
+    own = [word for word in words if not INTERPRETER.fullmatch(Path(word).name)] or words
+    files = [word for word in own if "/" in word or Path(word).suffix]
+    stem = Path((files or own or command)[0]).stem
     name = "".join(char if char.isalnum() else "_" for char in stem)
     return name if name[:1].isalpha() or name[:1] == "_" else f"_{name}"

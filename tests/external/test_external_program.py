@@ -79,7 +79,8 @@ def test_what_it_thinks_is_in_the_record(tmp_path: Path) -> None:
     ("misbehaves", "kind", "error", "words"),
     [
         ("raise SystemExit(3)", "died", "exit-status-3", "exit status 3 before it answered step"),
-        ("1 / 0", "died", "exit-status-1", "frame 5"),
+        ("1 / 0", "died", "exit-status-1", "step, frame 5: ZeroDivisionError: division by zero"),
+        ("import wanted", "died", "exit-status-1", "No module named 'wanted'"),
         ("__import__('os').kill(__import__('os').getpid(), 11)", "died", "signal-11", "SIGSEGV"),
         ("__import__('os').close(link._answers); __import__('time').sleep(9)", "died", "Closed",
          "closed its stdin or stdout"),
@@ -192,6 +193,21 @@ def test_a_program_that_goes_after_the_check_is_a_finding(tmp_path: Path) -> Non
     assert crash is not None
     assert (crash.kind, crash.error) == ("died", "NotStarted")
     assert "No such file" in crash.message
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        (["./lander"], "lander"),
+        (["build/fast-lander", "--fast", "a.yaml"], "fast_lander"),
+        (["venv/bin/python3.8", "-u", "my_lander.py"], "my_lander"),
+        (["python", "-m", "landing"], "landing"),
+        (["env", "bash", "-c", "./2nd"], "_2nd"),
+        (["python"], "python"),
+    ],
+)
+def test_a_program_has_the_name_of_what_runs(command: list[str], name: str) -> None:
+    assert ExternalProgram(command).name == name
 
 
 def test_a_command_is_a_list_of_words() -> None:
