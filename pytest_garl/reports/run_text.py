@@ -210,10 +210,10 @@ def director_text(search: SearchRecord) -> str:
         f"meet the UAV, and {director.met} did"
     )
     return (
-        f"begins of {director.npcs} NPCs (1 is a collision that the system could have prevented): "
-        f"as the director decides that learned from these flights {director.learned:.2f}, with the "
-        f"weights that ship {director.shipped:.2f}, by the fixed rule {director.rule:.2f}, at best "
-        f"{director.best:.2f}{seen if director.seen else ''}"
+        f"what begins of {director.npcs} NPCs were worth, where 1 is a collision that the system "
+        f"could have prevented: {director.learned:.2f} as the director decides that learns from "
+        f"earlier flights, {director.shipped:.2f} with the weights that ship, {director.rule:.2f} "
+        f"by the fixed rule, {director.best:.2f} at best{seen if director.seen else ''}"
     )
 
 
