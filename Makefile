@@ -14,13 +14,14 @@ CLUSTERS := $(VENV)/.clusters
 ROS := $(VENV)/ros
 ROS_PACKAGES := rclpy rmw-fastrtps-cpp rmw-security-common rosgraph-msgs sensor-msgs geometry-msgs std-msgs
 OTHER := $(VENV)/.other
+RELEASES := $(VENV)/.releases
 CHECKS := $(VENV)/checks.log
 SMOKE := .garl/experiment-smoke
 
 # The tests start some thousand processes; without the compiled files each would parse the sources.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: search test test-others test-other test-long test-ray lint types layers tests bench faults experiment-smoke clean
+.PHONY: search test test-others test-other test-long test-ray lint types layers tests bench dist faults experiment-smoke clean
 .DEFAULT_GOAL := help
 
 help:  ## show the commands
@@ -70,7 +71,7 @@ test-others:  ## the fast tests and the saved cases on every other supported Pyt
 test-other: $(OTHER)
 	$(BIN)/python --version
 	$(BIN)/pytest -n 2 --dist=worksteal -m "not sim and not ray and not long" tests
-	$(BIN)/pytest -n 2 --dist=worksteal -m long tests/landing_systems/test_saved_cases.py
+	$(BIN)/pytest -n 2 --dist=worksteal -m long tests/landing_systems/test_saved_cases.py tests/test_distribution.py
 
 test-long: $(READY)  ## the tutorial, 50 kills, 154 misbehaving systems, more fuzz: an hour
 	$(BIN)/pytest -n 2 --dist=worksteal -m long tests
@@ -80,6 +81,11 @@ test-ray: $(CLUSTERS)  ## the tests that start Ray clusters: minutes, so not par
 
 test-ros2: $(READY) $(ROS)/.installed  ## the tests that run a ROS 2 node: 394 MB of wheels for Linux on x86-64
 	ROS_PYTHON=$(ROS)/bin/python $(BIN)/pytest tests/external/test_ros2.py
+
+dist: $(RELEASES)  ## build what is released into dist/, and check it
+	rm -rf dist
+	$(BIN)/python -m hatchling build
+	$(BIN)/twine check --strict dist/*
 
 bench: $(READY)  ## measure frames, flights and the plugin's overhead
 	$(BIN)/python -m lab.benchmarks
@@ -115,6 +121,11 @@ $(READY): pyproject.toml constraints.txt
 $(OTHER): pyproject.toml constraints.txt
 	$(ANEW)
 	$(INSTALL) -e '.[dev]'
+	touch $@
+
+# Only a release needs Twine.
+$(RELEASES): $(READY)
+	$(INSTALL) -e '.[dev,train,release]'
 	touch $@
 
 # Only the tests of clusters need Ray.

@@ -19,6 +19,7 @@ FORMS = sorted((DOCS.parent / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
     ("schema", "file"),
     [
         ("vendor.github-workflows", DOCS / "github-actions.yml"),
+        ("vendor.github-workflows", DOCS.parent / ".github" / "workflows" / "release.yml"),
         *(
             (f"vendor.github-issue-{'config' if form.stem == 'config' else 'forms'}", form)
             for form in FORMS

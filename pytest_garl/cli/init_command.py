@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +17,8 @@ from pytest_garl.errors import GarlError
 from pytest_garl.messages import command
 
 SKELETON = "my_landing:MyLandingSystem"
+EXAMPLE = "landing_systems"
+"""The folder of the example; a wheel holds it inside of the package, a checkout beside it."""
 IGNORED = ".garl/"
 """Ledgers, records and films of runs: large, and made again by each run."""
 TEST = """\
@@ -52,7 +56,10 @@ class _Step:
 
 @click.command()
 @click.argument("system", metavar="[MODULE:CLASS]", default="")
-def init(system: str) -> None:
+@click.option(
+    "--example", is_flag=True, help="Write the three landing systems of the paper and their tests."
+)
+def init(system: str, example: bool) -> None:
     """Write a test file, pytest's settings and a .gitignore entry.
 
     MODULE:CLASS is your landing system, such as my_landing:MyLandingSystem. Without it the command
@@ -61,6 +68,17 @@ def init(system: str) -> None:
     """
     here = Path.cwd()
     settings = find_settings(here)
+    if example:
+        if system:
+            raise GarlError(f"--example: found {system} too; expected one of them")
+        test = here / EXAMPLE / "test_opencv_mls.py"
+        steps = [
+            _Step(file=settings.file, done=settings.add(SETTINGS)),
+            _copy_example(here / EXAMPLE),
+            _ignore(here / ".gitignore"),
+        ]
+        _show(steps, test, here)
+        return
     steps = []
     if not system:
         system = SKELETON
@@ -75,6 +93,11 @@ def init(system: str) -> None:
         _write(test, _test_of(system)),
         _ignore(here / ".gitignore"),
     ]
+    _show(steps, test, here)
+
+
+def _show(steps: Sequence[_Step], test: Path, here: Path) -> None:
+    """Print what was done and what to run next."""
     for step in steps:
         click.echo(f"{step.done:<10} {step.file.relative_to(here)}")
     click.echo("\nThen run:")
@@ -118,6 +141,21 @@ def _write_skeleton(file: Path) -> _Step:
             f"system: garl init {file.stem}:CLASS"
         )
     return _write(file, text)
+
+
+def _copy_example(folder: Path) -> _Step:
+    """Write the landing systems that come with the package, as they are; a folder stays."""
+    package = Path(__file__).parents[1]
+    source = next(
+        each for each in (package / "example" / EXAMPLE, package.parent / EXAMPLE) if each.is_dir()
+    )
+    if folder.exists():
+        return _Step(file=folder, done="unchanged")
+    try:
+        shutil.copytree(source, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    except OSError as error:
+        raise GarlError(f"{folder}: cannot be written ({error})") from error
+    return _Step(file=folder, done="wrote")
 
 
 def _write(file: Path, text: str) -> _Step:

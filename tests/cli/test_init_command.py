@@ -187,3 +187,24 @@ def test_first_search_runs_after_init(folder: Path) -> None:
     assert done.returncode in (0, 1), done.stdout + done.stderr
     assert "garl: violations" in done.stdout
     assert (folder / ".garl" / "ledger.sqlite").is_file()
+
+
+def test_example_is_the_landing_systems_of_the_paper(folder: Path) -> None:
+    done = init("--example")
+    assert done.exit_code == 0, done.output
+    assert "wrote      landing_systems\n" in done.output
+    assert "    garl check landing_systems/test_opencv_mls.py\n" in done.output
+    found = collected(folder)
+    for name in ("opencv", "tphyolo", "mm"):
+        assert f"test_{name}_mls.py::test_lands_in_time[court-g00-s00]" in found
+    before = contents(folder)
+    done = init("--example")
+    assert "unchanged  landing_systems\n" in done.output
+    assert contents(folder) == before
+
+
+def test_example_is_no_landing_system_of_a_name(folder: Path) -> None:
+    done = init("lander:Slow", "--example")
+    assert done.exit_code == 1
+    assert "--example: found lander:Slow too" in done.output
+    assert contents(folder) == {}
