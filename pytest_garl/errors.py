@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import platform
 from typing import Any
 
 from pytest_garl.messages import printable
@@ -78,3 +80,16 @@ class NotFiniteError(GarlError):
 
 class SimulatorError(GarlError):
     """A simulator that fails in a fresh process, with a landing system that is known to be good."""
+
+
+class PlatformError(GarlError):
+    """A system on which nothing can be flown."""
+
+
+def check_platform() -> None:
+    """Raise PlatformError on a system that cannot fork, as a worker does for each flight."""
+    if not hasattr(os, "fork"):
+        raise PlatformError(
+            f"{platform.system()} cannot fly: pytest-garl needs Linux or macOS; on Windows install "
+            "it in WSL, the Windows Subsystem for Linux"
+        )

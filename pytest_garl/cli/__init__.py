@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.errors import GarlError
+from pytest_garl.errors import GarlError, check_platform
 
 COMMANDS = {
     "baseline": "baseline",
@@ -54,6 +54,7 @@ class Pinned(click.Command):
     def invoke(self, ctx: click.Context) -> object:
         """Run, and show an error of the project in one line."""
         try:
+            check_platform()
             with _clean_exit_on_sigterm():
                 return super().invoke(ctx)
         except GarlError as error:

@@ -79,9 +79,13 @@ class _Worker:
     def has_ended(self) -> bool:
         """Return whether the process has ended; if so, end the rest of its session."""
         pid = self.process.pid
-        # Popen.poll would free the id, by which the rest of the session is ended.
+        # Popen.poll frees the id, by which the rest of the session is ended.
         try:
-            if os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+            if not hasattr(os, "waitid"):
+                # As on macOS before Python 3.13: the id is used at once.
+                if self.process.poll() is None:
+                    return False
+            elif os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
                 return False
         except ChildProcessError:
             # Somebody in this process ignores SIGCHLD, so that the kernel has buried it.

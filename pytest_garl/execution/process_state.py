@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import contextlib
 import ctypes
 import importlib
 import locale
@@ -180,10 +181,10 @@ def _identity(number: int) -> tuple[int, int]:
 
 
 def _open_files() -> int:
-    try:
-        return len(list(Path("/proc/self/fd").iterdir()))
-    except OSError:
-        return sys.maxsize
+    for folder in ("/proc/self/fd", "/dev/fd"):
+        with contextlib.suppress(OSError):
+            return len(list(Path(folder).iterdir()))
+    return sys.maxsize
 
 
 def _can_open() -> bool:

@@ -1,4 +1,8 @@
-"""Operating-system processes: which of them live, and how a child process is tied to its parent."""
+"""Operating-system processes: which of them live, and how a child process is tied to its parent.
+
+Linux tells a process's children in files, and has the kernel tie a process to its parent.  Where it
+does not, as on macOS, ``ps`` lists the processes, and a thread looks for the parent.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +12,15 @@ import dataclasses
 import json
 import os
 import signal
+import subprocess
 import sys
+import tempfile
+import threading
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any
 
 from pytest_garl.errors import GarlError
@@ -22,6 +29,8 @@ LONGEST_LOOK_S = 1.0
 """So much of the time between two looks at a heartbeat counts."""
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
+_LOOKS_EVERY_S = 0.5
+"""How often a process looks for its parent where the kernel does not."""
 
 
 def alive(pid: int) -> bool:
@@ -33,11 +42,13 @@ def alive(pid: int) -> bool:
     except PermissionError:
         return True
     # A zombie has ended; only its parent has not asked for its status yet.
-    return _stat(pid)[:1] != ["Z"]
+    return not _has_proc() or _stat(pid)[:1] != ["Z"]
 
 
 def any_command_contains(text: str) -> bool:
     """Return whether the command line of a living process contains this text."""
+    if not _has_proc():
+        return any(text in command for _, _, command in _listed())
     for file in Path("/proc").glob("[0-9]*/cmdline"):
         with contextlib.suppress(OSError):
             if os.fsencode(text) in file.read_bytes():
@@ -47,6 +58,9 @@ def any_command_contains(text: str) -> bool:
 
 def children_of(parent: int) -> Iterator[int]:
     """Yield the ids of a process's children, zombies included."""
+    if not _has_proc():
+        yield from (pid for pid, above, _ in _listed() if above == parent)
+        return
     for folder in Path("/proc").glob("[0-9]*"):
         stat = _stat(int(folder.name))
         if len(stat) > 1 and int(stat[1]) == parent:
@@ -57,8 +71,10 @@ def descendants_of(ancestor: int) -> set[int]:
     """Return the ids of all processes below one, zombies included."""
     found: set[int] = set()
     new = {ancestor}
+    listed = [] if _has_proc() else _listed()
     while new:
         children = {child for parent in new for child in _children_by_thread(parent)}
+        children |= {pid for pid, above, _ in listed if above in new}
         new = children - found
         found |= new
     return found
@@ -80,6 +96,24 @@ def _stat(pid: int) -> list[str]:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:
         return []
+
+
+def _has_proc() -> bool:
+    """Return whether the system tells about processes in files."""
+    return Path("/proc/self/stat").exists()
+
+
+def _listed() -> list[tuple[int, int, str]]:
+    """Return id, parent and command line of all processes but the one that lists them."""
+    listing = subprocess.Popen(
+        ["ps", "-A", "-o", "pid=", "-o", "ppid=", "-o", "command="],
+        stdout=subprocess.PIPE,
+        text=True,
+        errors="replace",
+    )
+    rows = (line.split(maxsplit=2) for line in listing.communicate()[0].splitlines())
+    found = [(int(row[0]), int(row[1]), *row[2:]) for row in rows if len(row) > 1]
+    return [(pid, above, *rest, "")[:3] for pid, above, *rest in found if pid != listing.pid]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,8 +198,11 @@ class Parent:
 
 
 def create_report_file() -> int:
-    """Return the descriptor of a file in memory for the report of a child process."""
-    return os.memfd_create("garl-report")
+    """Return the descriptor of a file without a name for the report of a child process."""
+    if hasattr(os, "memfd_create"):
+        return os.memfd_create("garl-report")
+    with tempfile.TemporaryFile() as file:
+        return os.dup(file.fileno())
 
 
 def read_report(file: int) -> WorkerReport | None:
@@ -198,12 +235,31 @@ class Heartbeat:
         return self._silent_s
 
 
-def end_with_parent(parent: int, number: int = signal.SIGTERM) -> None:
-    """Have the kernel send this process a signal when its parent ends."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
+def end_with_parent(parent: int, number: int = signal.SIGTERM, *, forks: bool = False) -> None:
+    """Send this process a signal when its parent ends: by the kernel, if it can.
+
+    Otherwise a thread does.  A process that ``forks`` must have no threads: there it has to look
+    for its parent itself, by ``Parent.lives``.
+    """
+    if not _prctl(_PR_SET_PDEATHSIG, number) and not forks:
+        threading.Thread(target=_await_end, args=(parent, number), daemon=True).start()
     if os.getppid() != parent:
         # The parent ended before the call of prctl.
         os._exit(1)
+
+
+def _await_end(parent: int, number: int) -> None:
+    while os.getppid() == parent:
+        sleep(_LOOKS_EVERY_S)
+    os.kill(os.getpid(), number)
+
+
+def _prctl(option: int, value: int) -> bool:
+    """Call prctl; return whether the system has it."""
+    function = getattr(ctypes.CDLL(None), "prctl", None)
+    if function is not None:
+        function(option, value)
+    return function is not None
 
 
 def ignore_ctrl_c() -> None:
@@ -212,8 +268,11 @@ def ignore_ctrl_c() -> None:
 
 
 def adopt_orphans() -> None:
-    """Become the parent of all processes below this one whose own parent ends, in any session."""
-    ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    """Become the parent of all processes below this one whose own parent ends, in any session.
+
+    Without prctl such a process is left behind if it has left its session.
+    """
+    _prctl(_PR_SET_CHILD_SUBREAPER, 1)
 
 
 def run_worker(main: Callable[..., None], component: str) -> None:
@@ -223,7 +282,7 @@ def run_worker(main: Callable[..., None], component: str) -> None:
     """
     parent = Parent.of_this_process()
     ignore_ctrl_c()
-    end_with_parent(parent.pid)
+    end_with_parent(parent.pid, forks=True)
     try:
         main(parent, *sys.argv[3:])
     except Exception as error:  # noqa: BLE001 (the pool raises it)

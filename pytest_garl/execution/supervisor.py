@@ -58,7 +58,8 @@ BEAT_EVERY_S = 0.25
 """How often the supervisor shows that it goes on: a landing system may stop it by a signal."""
 ANSWER_EVERY_S = 0.001
 """How often a flying process looks whether its flight is judged; that takes 20 ms."""
-_DUMP = signal.SIGRTMAX
+_DUMP: int = getattr(signal, "SIGRTMAX", signal.SIGUSR2)
+"""A signal that nobody else sends; macOS has none that is free."""
 _STDERR = 2
 _BEGAN, _LIMIT, _MOVED, _ENDING, _LENGTH, _ASKED = range(6)
 _TEXT = 64

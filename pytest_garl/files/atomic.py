@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import re
 import tempfile
@@ -55,6 +54,9 @@ def locked(folder: Path) -> Iterator[None]:
             f"{folder}: nothing can be saved here ({error}); choose another folder of cases "
             "with the ini key garl_cases"
         ) from error
+    # Windows has none, and saves nothing.
+    import fcntl
+
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)
         _remove_incomplete(folder)
@@ -67,5 +69,16 @@ def _remove_incomplete(folder: Path) -> None:
     """Remove the incomplete files of processes that were killed while writing."""
     for path in folder.glob(".*"):
         found = re.fullmatch(r"\..+\.(\d+)", path.name)
-        if found and not Path(f"/proc/{found[1]}").exists():
+        if found and not _exists(int(found[1])):
             path.unlink(missing_ok=True)
+
+
+def _exists(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        # It is another user's.
+        return True
+    return True

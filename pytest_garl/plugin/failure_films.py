@@ -62,12 +62,12 @@ def film_lines(films: Films, config: Any) -> list[str]:
 def _drawn(reporter: Any, run: Run, failures: Sequence[_Failure]) -> Films:
     from pytest_garl.reports.films import (
         FilmTask,
-        cores,
         draw_films,
         recorded_flight,
         why_no_film,
     )
     from pytest_garl.reports.html import MOST_FILMS
+    from pytest_garl.reports.html.page_workers import cores
 
     shown, folder = failures[:MOST_FILMS], run.options.films
     tasks = {

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.errors import GarlError
+from pytest_garl.errors import GarlError, check_platform
 from pytest_garl.plugin import hookspecs
 from pytest_garl.plugin.abort import abort_if_fatal, drop_entries_without_line, fail_report
 from pytest_garl.plugin.arguments import (
@@ -107,9 +107,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
         config.pluginmanager.register(ProbesPlugin(options), "garl_probes")
     if options.searches_or_repeats and not config.option.collectonly:
-        from pytest_garl.plugin.startup import begin_run
-
-        begin_run(config, options)
+        _begin_run(config, options)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -177,9 +175,8 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         check_selection(options_of(config), session.items)
     if RUN not in config.stash and any(is_landing_item(item) for item in session.items):
         from pytest_garl.plugin.options import options_of
-        from pytest_garl.plugin.startup import begin_run
 
-        begin_run(config, options_of(config))
+        _begin_run(config, options_of(config))
     run = config.stash.get(RUN, None)
     if run is not None:
         try:
@@ -355,3 +352,14 @@ def pytest_configure_node(node: Any) -> None:
     run = node.config.stash.get(RUN, None)
     if run is not None:
         node.workerinput[SEED] = str(run.options.seed)
+
+
+def _begin_run(config: pytest.Config, options: Any) -> None:
+    """Begin the run, unless this system cannot fly: then the modules could not even be imported."""
+    try:
+        check_platform()
+    except GarlError as error:
+        raise pytest.UsageError(str(error)) from error
+    from pytest_garl.plugin.startup import begin_run
+
+    begin_run(config, options)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -125,8 +124,3 @@ def _problem_of(task: FilmTask) -> str:
     except (GarlError, OSError) as error:
         return str(error)
     return ""
-
-
-def cores() -> int:
-    """Return how many processes can draw at once."""
-    return len(os.sched_getaffinity(0))

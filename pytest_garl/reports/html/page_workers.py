@@ -23,6 +23,13 @@ START_S = 1.0
 """A process takes so long to start as two or three flights without a film take to draw."""
 
 
+def cores() -> int:
+    """Return how many processes can draw at once."""
+    # macOS ties no process to some of the cores.
+    ours = getattr(os, "sched_getaffinity", None)
+    return len(ours(0)) if ours else os.cpu_count() or 1
+
+
 def shown_flights(
     tasks: Sequence[FlightTask], workers: int, on_done: Callable[[int], None] = lambda done: None
 ) -> list[ShownFlight]:

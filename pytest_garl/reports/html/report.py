@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from pytest_garl.reports.html.flight_task import ShownFlight
 from pytest_garl.reports.html.folder import check_target, new_folder
 from pytest_garl.reports.html.kind_page import KindPlan, found_page, kind_page, plan_kinds
 from pytest_garl.reports.html.naming import INDEX, still_address
-from pytest_garl.reports.html.page_workers import shown_flights
+from pytest_garl.reports.html.page_workers import cores, shown_flights
 from pytest_garl.reports.html.pictures import picture_bytes
 from pytest_garl.reports.html.rendering import render_comparison, render_index, render_kind
 from pytest_garl.reports.html.run_page import RunPage, run_page
@@ -54,7 +53,7 @@ def write_html_report(
     no_encoder = _no_encoder() if films else ""
     plans = plan_kinds(run, 0 if no_encoder else films)
     tasks = [task for plan in plans for task in (plan.task, plan.found) if task is not None]
-    flights = iter(shown_flights(tasks, workers or _cores(), on_done))
+    flights = iter(shown_flights(tasks, workers or cores(), on_done))
     shown = [(plan, next(flights), next(flights) if plan.found else None) for plan in plans]
     notes = _notes([flight for _, *both in shown for flight in both if flight], no_encoder, plans)
     with new_folder(out) as folder:
@@ -88,10 +87,6 @@ def write_comparison(found: RunComparison, out: Path) -> Path:
 
 def _write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", newline="")
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0))
 
 
 def _no_encoder() -> str:

@@ -1,0 +1,17 @@
+"""Take from every Python that starts what Windows does not have: a test cannot run there.
+
+Put this folder on PYTHONPATH.
+"""
+
+import os
+import signal
+import sys
+
+for name in ("fcntl", "resource", "termios", "pwd", "grp"):
+    sys.modules[name] = None
+for module, names in (
+    (signal, ("SIGRTMAX", "SIGALRM", "SIGUSR1", "SIGUSR2", "setitimer", "getitimer")),
+    (os, ("fork", "killpg", "memfd_create", "pidfd_open", "sched_getaffinity", "setsid", "waitid")),
+):
+    for name in names:
+        vars(module).pop(name, None)
