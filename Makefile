@@ -21,7 +21,7 @@ SMOKE := .garl/experiment-smoke
 # The tests start some thousand processes; without the compiled files each would parse the sources.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: search test test-others test-other test-long test-ray lint types layers tests bench dist faults experiment-smoke clean
+.PHONY: search test test-others test-other test-long test-ray test-ros2 lint types layers tests bench dist faults experiment-smoke clean
 .DEFAULT_GOAL := help
 
 help:  ## show the commands
@@ -135,6 +135,6 @@ $(CLUSTERS): $(READY)
 
 # ROS 2 has its own environment, as a user's node has: it flies beside pytest's, not in it.
 $(ROS)/.installed: | $(READY)
-	$(PYTHON) -m venv $(ROS)
+	$(TESTED) -m venv $(ROS)
 	$(ROS)/bin/pip install --quiet --disable-pip-version-check $(addprefix ros-,$(ROS_PACKAGES)) numpy
 	touch $@

@@ -11,6 +11,7 @@ import ctypes
 import dataclasses
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -111,9 +112,9 @@ def _listed() -> list[tuple[int, int, str]]:
         text=True,
         errors="replace",
     )
-    rows = (line.split(maxsplit=2) for line in listing.communicate()[0].splitlines())
-    found = [(int(row[0]), int(row[1]), *row[2:]) for row in rows if len(row) > 1]
-    return [(pid, above, *rest, "")[:3] for pid, above, *rest in found if pid != listing.pid]
+    rows = re.findall(r"^ *(\d+) +(\d+) *(.*)$", listing.communicate()[0], re.MULTILINE)
+    found = [(int(pid), int(above), command) for pid, above, command in rows]
+    return [each for each in found if each[0] != listing.pid]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

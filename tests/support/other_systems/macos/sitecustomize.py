@@ -4,8 +4,11 @@ Put this folder on PYTHONPATH.
 """
 
 import ctypes
+import io
 import os
 import signal
+from collections.abc import Callable
+from typing import Any
 
 for module, names in (
     (signal, ("SIGRTMAX", "SIGRTMIN")),
@@ -15,30 +18,25 @@ for module, names in (
         vars(module).pop(name, None)
 
 
-def _is_gone(path):
-    return isinstance(path, str | os.PathLike) and os.fspath(path).startswith("/proc")
-
-
-def _without_proc(function):
-    def call(path=".", *rest, **named):
-        if _is_gone(path):
+def _without_proc(function: Callable[..., Any]) -> Callable[..., Any]:
+    def call(path: Any = ".", *rest: Any, **named: Any) -> Any:
+        if isinstance(path, str | os.PathLike) and os.fspath(path).startswith("/proc"):
             raise FileNotFoundError(2, "No such file or directory", os.fspath(path))
         return function(path, *rest, **named)
 
     return call
 
 
+def _without_symbols(found: Callable[..., Any]) -> Callable[..., Any]:
+    def symbol(library: ctypes.CDLL, name: str) -> Any:
+        if name in ("prctl", "malloc_trim"):
+            raise AttributeError(name)
+        return found(library, name)
+
+    return symbol
+
+
 for name in ("stat", "lstat", "listdir", "scandir", "open"):
-    setattr(os, name, _without_proc(getattr(os, name)))
-import io  # noqa: E402 (after the functions that it would keep)
-
-io.open = _without_proc(io.open)
-
-
-def _symbol(library, name, found=ctypes.CDLL.__getattr__):
-    if name in ("prctl", "malloc_trim"):
-        raise AttributeError(name)
-    return found(library, name)
-
-
-ctypes.CDLL.__getattr__ = _symbol
+    vars(os)[name] = _without_proc(vars(os)[name])
+vars(io)["open"] = _without_proc(io.open)
+type.__setattr__(ctypes.CDLL, "__getattr__", _without_symbols(ctypes.CDLL.__getattr__))

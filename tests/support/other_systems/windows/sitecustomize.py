@@ -6,9 +6,11 @@ Put this folder on PYTHONPATH.
 import os
 import signal
 import sys
+from typing import Any
 
+modules: dict[str, Any] = sys.modules
 for name in ("fcntl", "resource", "termios", "pwd", "grp"):
-    sys.modules[name] = None
+    modules[name] = None
 for module, names in (
     (signal, ("SIGRTMAX", "SIGALRM", "SIGUSR1", "SIGUSR2", "setitimer", "getitimer")),
     (os, ("fork", "killpg", "memfd_create", "pidfd_open", "sched_getaffinity", "setsid", "waitid")),
