@@ -14,6 +14,7 @@ __version__ = "0.2.0.dev0"
 _HOMES = {
     "pytest_garl.airframe": ("Airframe", "Camera", "Rangefinder"),
     "pytest_garl.external.external_program": ("ExternalProgram",),
+    "pytest_garl.companion.companion_program": ("CompanionProgram",),
     "pytest_garl.fiducial": ("MarkerSpec", "NestedMarker"),
     "pytest_garl.landing_system": (
         "Abort",
@@ -34,6 +35,7 @@ _HOMES = {
     "pytest_garl.scenarios.task": ("Start",),
     "pytest_garl.flight.flight": ("Flight",),
     "pytest_garl.simulation.npc_policy": ("Move", "PolicySpec", "Situation"),
+    "pytest_garl.vehicle.autopilot": ("ArduCopter",),
     "pytest_garl.verdicts.verdict": ("Limits", "limits"),
     "pytest_garl.reports.film": ("save_video",),
 }

@@ -1,3 +1,4 @@
+from pytest_garl.companion.companion_program import CompanionProgram
 from pytest_garl.external.external_program import ExternalProgram
 from pytest_garl.fiducial import MarkerSpec, NestedMarker
 from pytest_garl.flight.flight import Flight
@@ -23,6 +24,7 @@ from pytest_garl.plugin.landing import Landing
 from pytest_garl.reports.film import save_video
 from pytest_garl.scenarios.task import Start
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
+from pytest_garl.vehicle.autopilot import ArduCopter
 from pytest_garl.verdicts.verdict import Limits
 
 __version__: str
@@ -30,9 +32,11 @@ __version__: str
 __all__ = [
     "Abort",
     "Airframe",
+    "ArduCopter",
     "AttitudeSetpoint",
     "Camera",
     "Command",
+    "CompanionProgram",
     "Detection",
     "Diagnostics",
     "ExternalProgram",

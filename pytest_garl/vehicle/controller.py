@@ -79,6 +79,11 @@ class ArduPilotControl:
         x, y = self._horizontal.target.position
         return x, y, self._vertical.target.position
 
+    @property
+    def heading_rad(self) -> float:
+        """The heading that the vehicle shall have."""
+        return self._yaw
+
     def take_off(self, height_m: float) -> None:
         """Start the motors and climb straight up to a height above the ground; then hold.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from pytest_garl.simulation.physics.vehicle import (
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.vehicle import ArduPilotControl, ArduPilotParameters
 
-Orders = Callable[[float, ArduPilotControl], None]
+Orders = Callable[[float, Any], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,16 +59,22 @@ def fly_bare(
     wind_mps: tuple[float, float] = (0.0, 0.0),
     wind_from_s: float = 0.0,
     control_rate_hz: float = PHYSICS_RATE_HZ,
+    make: Callable[[Airframe], Any] | None = None,
+    start_m: float = 0.0,
 ) -> Trace:
     """Fly from the ground at the origin; ``orders(time, controller)`` is called each step.
+
+    ``make`` makes another controller, ``start_m`` begins in the air.
 
     The wind blows towards ``wind_mps`` from ``wind_from_s`` on.
     """
     airframe = Airframe(control_rate_hz=control_rate_hz)
-    control = ArduPilotControl(airframe, parameters)
+    control: Any = make(airframe) if make else ArduPilotControl(airframe, parameters)
     model = vehicle_model(airframe)
     world = World(model, (0.0, 0.0, 0.0), [], [], FEET_FRICTION["concrete"])
     every = round(PHYSICS_RATE_HZ / control_rate_hz)
+    if start_m:
+        world.place_uav((0.0, 0.0, start_m), (0.0, 0.0, 0.0, 1.0))
     thrusts: Thrusts = (0.0, 0.0, 0.0, 0.0)
     wanted = thrusts
     rows: list[tuple[float, ...]] = []
@@ -89,7 +96,7 @@ def fly_bare(
                 orders(state.time_s, control)
                 wanted = control.control(state).newtons
             modes.append(control.mode)
-            target = control.target_position_m
+            target = getattr(control, "target_position_m", position)
             rows.append((state.time_s, *position, *velocity, *attitude, *rates, *thrusts, *target))
             thrusts = lag(thrusts, wanted, model, 1 / PHYSICS_RATE_HZ)
             total, torque = wrench(thrusts, model)

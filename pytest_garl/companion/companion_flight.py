@@ -1,0 +1,438 @@
+"""One flight of a companion program: its process, its autopilot, and the bytes between them."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import selectors
+import signal
+import socket
+import struct
+import subprocess
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from pytest_garl import cpu_dispatch
+from pytest_garl.airframe import Airframe, Camera
+from pytest_garl.distortion import undistorted
+from pytest_garl.foreign_text import cut
+from pytest_garl.landing_system import (
+    Command,
+    Detection,
+    Diagnostics,
+    Mission,
+    MotorThrusts,
+    Observation,
+    VehicleState,
+)
+from pytest_garl.program import ProgramFailedError
+from pytest_garl.vehicle.autopilot import ArduCopter, Autopilot
+from pytest_garl.vehicle.mavlink import MavlinkLink
+from pytest_garl.vehicle.ned import on_globe
+from pytest_garl.vehicle.rotations import rotate
+
+RUNNER = Path(__file__).with_name("inside") / "start.py"
+EXCHANGES_HZ = 50.0
+"""How often the program gets time and the vehicle's state between two frames."""
+LINK_BY_S = 30.0
+"""A program that has opened no link to the vehicle by then never will."""
+MOST_MESSAGE = 2**24
+"""Bytes of a message from the process: all that it may hold is cut before."""
+TARGET_FOR_S = 1.0
+"""So long a landing target that the program told of is what it takes for the marker."""
+SAID_BYTES = 4096
+NOTE_CHARS = 900
+FARTHEST_M = 100.0
+_HEADER = struct.Struct("!cI")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """How the process is started."""
+
+    name: str
+    python: str
+    arguments: tuple[str, ...]
+    folder: Path
+    environment: Mapping[str, str]
+    windows: str
+
+
+def mission_facts(mission: Mission | None, camera: Camera) -> dict[str, object]:
+    """Return what may stand in braces in a command; without a mission only the names count."""
+    east, north = mission.gps_position_m if mission else (0.0, 0.0)
+    x, y, _ = mission.home_m if mission else (0.0, 0.0, 0.0)
+    lat, lon = on_globe(east, north)
+    return {
+        "marker_id": mission.marker_id if mission else 0,
+        "marker_side_m": mission.marker_side_m if mission else 0.0,
+        "marker_dictionary": mission.marker_dictionary if mission else "",
+        "lat_deg": f"{lat:.7f}",
+        "lon_deg": f"{lon:.7f}",
+        "north_m": f"{north - y:.3f}",
+        "east_m": f"{east - x:.3f}",
+        "search_altitude_m": mission.search_altitude_m if mission else 0.0,
+        "width_px": camera.width_px,
+        "height_px": camera.height_px,
+        "focal_px": f"{camera.focal_px:.4f}",
+    }
+
+
+class CompanionFlight:
+    """A landing system: the program decides, the autopilot flies the motors."""
+
+    def __init__(self, start: Start, airframe: Airframe, vehicle: ArduCopter) -> None:
+        self._start, self._airframe, self._vehicle = start, airframe, vehicle
+        self._process: CompanionProcess | None = None
+
+    def reset(self, mission: Mission) -> None:
+        """Start the program for one flight."""
+        self.close()
+        self._autopilot = Autopilot(self._airframe, mission, self._vehicle)
+        self._outbox: list[bytes] = []
+        self._link = MavlinkLink(self._autopilot, self._outbox.append)
+        self._inbox: deque[tuple[float, bytes]] = deque()
+        self._due_s = 0.0
+        self._frames = 0
+        self._observation: Observation | None = None
+        self._seen: list[Detection] = []
+        self._printed: list[str] = []
+        self._target: tuple[float, tuple[float, float, float]] | None = None
+        self._process = CompanionProcess(self._start, self._airframe.camera, mission)
+
+    def step(self, observation: Observation) -> Command:
+        """Let the program look at a frame; return what the vehicle does, for the record."""
+        self._observation = observation
+        self._frames += 1
+        self._link.rangefinder_m = observation.rangefinder_m
+        if self._autopilot.state is not None:
+            self._exchange()
+        return self._autopilot.command(self._told(observation))
+
+    def control(self, state: VehicleState) -> MotorThrusts:
+        """Fly the motors for one control step; 50 times a second the program gets its time."""
+        thrusts = self._autopilot.control(state)
+        while self._inbox and self._inbox[0][0] <= state.time_s:
+            self._link.receive(self._inbox.popleft()[1])
+        if self._link.nonsense:
+            field, self._link.nonsense = self._link.nonsense, ""
+            raise self._failure(
+                "BadMessage", f"sent {field}; expected a finite number", kind="nonsense"
+            )
+        if state.time_s >= self._due_s - 1e-9:
+            self._due_s += 1 / EXCHANGES_HZ
+            self._link.tell()
+            self._exchange()
+        return thrusts
+
+    def close(self) -> None:
+        """End the program."""
+        if self._process is not None:
+            self._process.close()
+            self._process = None
+
+    def _exchange(self) -> None:
+        """Let the program run up to the present, with what the vehicle has sent."""
+        process = self._process
+        assert process is not None
+        if process.ended:
+            return
+        now_s = self._autopilot.now.time_s
+        answer = process.exchange(now_s, self._frames, b"".join(self._outbox), self._picture)
+        self._outbox.clear()
+        if answer.sent:
+            self._inbox.append((now_s + self._airframe.latency_s, answer.sent))
+        self._printed += [answer.printed] if answer.printed else []
+        if self._observation is not None:
+            self._seen += [
+                _detection(number, corners, self._observation, self._airframe.camera)
+                for number, corners in answer.found
+            ]
+        if answer.status == 0:
+            self._printed.append("\nthe program has ended")
+        if answer.failure is not None:
+            raise self._failed(answer.failure)
+        if answer.status:
+            said = "".join(self._printed).strip()[-300:]
+            end = f"; it said last: {said}" if said else ""
+            raise self._failure(
+                f"exit-status-{answer.status}",
+                f"ended with exit status {answer.status} at {now_s:.1f} s of the flight{end}",
+                kind="died",
+            )
+        if now_s > LINK_BY_S and not answer.links and answer.status is None:
+            raise self._failure(
+                "NoLink",
+                f"has opened no link to the vehicle after {LINK_BY_S:g} s; expected MAVLink over "
+                "UDP (as udp:0.0.0.0:14550), TCP (tcp:127.0.0.1:5760) or a serial port",
+                kind="died",
+            )
+
+    def _picture(self) -> bytes:
+        assert self._observation is not None
+        return cv2.cvtColor(self._observation.image, cv2.COLOR_RGB2BGR).tobytes()
+
+    def _told(self, observation: Observation) -> Diagnostics:
+        """Return the diagnostics: nothing of it was said by the program for our sake."""
+        seen, self._seen = self._seen, []
+        pilot = self._autopilot
+        if pilot.target_m is not None:
+            self._target = (observation.time_s, pilot.target_m)
+            pilot.target_m = None
+        target = None
+        if self._target is not None and observation.time_s - self._target[0] < TARGET_FOR_S:
+            target = self._target[1]
+        notes = []
+        if seen:
+            ids = ", ".join(str(each.marker_id) for each in seen[:20])
+            notes.append(f"seen by its detector: {ids}")
+        if self._printed:
+            notes.append("".join(self._printed).strip())
+        self._printed = []
+        return Diagnostics(
+            phase=pilot.phase,
+            detections=tuple(seen[:100]),
+            target_m=target,
+            note=cut("\n".join(notes), NOTE_CHARS),
+        )
+
+    def _failed(self, failure: Mapping[str, str]) -> ProgramFailedError:
+        message = f"{failure['message']} ({failure['line']})" if failure["line"] else ""
+        missing = failure["error"] == "ModuleNotFoundError"
+        hint = f"; install it for {self._start.python}, or name another python=" if missing else ""
+        return ProgramFailedError(
+            failure["error"],
+            f"{message or failure['message']}{hint}",
+            where=failure["where"] or self._start.name,
+            trace=failure["trace"],
+        )
+
+    def _failure(self, error: str, message: str, *, kind: Any) -> ProgramFailedError:
+        name = self._start.name
+        return ProgramFailedError(error, f"{name} {message}", where=name, kind=kind)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """What a program did in one exchange."""
+
+    sent: bytes
+    printed: str
+    found: list[tuple[int, list[tuple[float, float]]]]
+    links: int
+    status: int | None
+    """The exit status of a program that has come to its end."""
+    failure: Mapping[str, str] | None
+
+
+class CompanionProcess:
+    """The process of a program; it runs only while ``exchange`` waits for it.
+
+    ``ended`` is whether the program has come to its end.
+    """
+
+    def __init__(self, start: Start, camera: Camera, mission: Mission) -> None:
+        self._name = start.name
+        facts = mission_facts(mission, camera)
+        ours, theirs = socket.socketpair()
+        self._link = ours
+        settings = {
+            "link": theirs.fileno(),
+            "arguments": [_filled(each, facts) for each in start.arguments],
+            "windows": start.windows,
+            "width_px": camera.width_px,
+            "height_px": camera.height_px,
+            "rate_hz": camera.rate_hz,
+        }
+        self.ended = False
+        self._said = b""
+        try:
+            self._process = subprocess.Popen(
+                [start.python, str(RUNNER), json.dumps(settings)],
+                cwd=start.folder,
+                env={**_environment(), **start.environment},
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,
+                bufsize=0,
+            )
+        except OSError as error:
+            raise self._failure("NotStarted", f"cannot be started: {error.strerror}") from None
+        finally:
+            theirs.close()
+        assert self._process.stdout is not None
+        self._output = self._process.stdout.fileno()
+        os.set_blocking(self._output, False)
+        self._wait = selectors.PollSelector()
+        self._wait.register(self._link, selectors.EVENT_READ)
+        self._wait.register(self._output, selectors.EVENT_READ)
+
+    def exchange(self, until_s: float, frame: int, data: bytes, picture: Any) -> Answer:
+        """Give the program time and bytes; return what it did until it waits for more."""
+        self._write(b"G", struct.pack("!dI", until_s, frame) + data)
+        while True:
+            kind, answer = self._read()
+            if kind != b"F":
+                break
+            self._write(b"", picture())
+        with self._refusing_garbage():
+            (size,) = struct.unpack_from("!I", answer)
+            facts = json.loads(answer[4 : 4 + size])
+            self.ended = "ended" in facts
+            return Answer(
+                sent=answer[4 + size :],
+                printed=str(facts["printed"]),
+                found=[
+                    (int(number), [(float(u), float(v)) for u, v in corners])
+                    for number, corners in facts["found"]
+                ],
+                links=int(facts["links"]),
+                status=int(facts["ended"]) if self.ended else None,
+                failure=facts.get("failure"),
+            )
+
+    def close(self) -> None:
+        """Kill the process, and what is left of its group."""
+        self._wait.close()
+        with contextlib.suppress(OSError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.kill()
+        self._process.wait()
+        self._link.close()
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+
+    @contextlib.contextmanager
+    def _refusing_garbage(self) -> Any:
+        try:
+            yield
+        except (ValueError, KeyError, TypeError, struct.error) as error:
+            raise self._failure(
+                "BadMessage",
+                f"wrote into the link between its process and the simulator ({error}); that "
+                "file is not its own",
+            ) from None
+
+    def _write(self, kind: bytes, data: bytes) -> None:
+        try:
+            self._link.sendall(_HEADER.pack(kind or b"I", len(data)) + data)
+        except OSError:
+            raise self._died() from None
+
+    def _read(self) -> tuple[bytes, bytes]:
+        with self._refusing_garbage():
+            kind, size = _HEADER.unpack(self._exactly(_HEADER.size))
+            if kind not in (b"D", b"F") or size > MOST_MESSAGE:
+                raise ValueError(f"a message of type {kind!r} and {size} bytes")
+        return kind, self._exactly(size)
+
+    def _exactly(self, size: int) -> bytes:
+        data = b""
+        while len(data) < size:
+            ready = {key.fd for key, _ in self._wait.select()}
+            if self._output in ready:
+                self._read_output()
+            if self._link.fileno() in ready:
+                try:
+                    part = self._link.recv(size - len(data))
+                except OSError:
+                    part = b""
+                if not part:
+                    raise self._died()
+                data += part
+        return data
+
+    def _read_output(self) -> None:
+        """Take what was written past Python's ``sys.stdout``: it may not block the process."""
+        try:
+            data = os.read(self._output, 2**16)
+        except BlockingIOError:
+            return
+        if not data:
+            self._wait.unregister(self._output)
+        self._said = (self._said + data)[-SAID_BYTES:]
+
+    def _died(self) -> ProgramFailedError:
+        status = self._process.wait()
+        for _ in range(2):
+            with contextlib.suppress(OSError, KeyError):
+                self._read_output()
+        how = f"exit status {status}" if status >= 0 else f"signal {-status}"
+        name = f" ({signal.Signals(-status).name})" if -status in {*signal.Signals} else ""
+        said = self._said.decode(errors="replace").strip()
+        end = f"; it said last: {said[-300:]}" if said else ""
+        return self._failure(
+            how.replace(" ", "-"), f"ended in the flight with {how}{name}{end}", trace=said
+        )
+
+    def _failure(self, error: str, message: str, *, trace: str = "") -> ProgramFailedError:
+        return ProgramFailedError(
+            error, f"{self._name} {message}", where=self._name, trace=trace, kind="died"
+        )
+
+
+def _filled(word: str, facts: Mapping[str, object]) -> str:
+    """Return an argument with the facts in its braces; as it is if the braces are its own."""
+    try:
+        return word.format(**facts)
+    except (KeyError, IndexError, ValueError, AttributeError):
+        return word
+
+
+def _environment() -> dict[str, str]:
+    """Return the environment of a program: this process's, with one order of hashes and kernels."""
+    own = {
+        key: value
+        for key, value in os.environ.items()
+        if not key.startswith(("PYTEST_", "COV_CORE_"))
+    }
+    return {
+        **own,
+        **cpu_dispatch.environment_of_programs(),
+        "QT_QPA_PLATFORM": "offscreen",
+    }
+
+
+def _detection(
+    number: int, corners: list[tuple[float, float]], observation: Observation, camera: Camera
+) -> Detection:
+    """Return a marker that the program's detector found, where its middle meets the ground."""
+    u, v = (sum(each) / max(1, len(corners)) for each in zip(*corners, strict=True))
+    return Detection(
+        marker_id=number if abs(number) < 2**31 else -1,
+        confidence=1.0,
+        position_m=_on_the_ground((u, v), observation, camera),
+        corners_px=tuple(corners),
+    )
+
+
+def _on_the_ground(
+    pixel: tuple[float, float], observation: Observation, camera: Camera
+) -> tuple[float, float, float]:
+    """Follow the ray of a pixel to the ground, or 100 m far if it does not meet the ground."""
+    (cx, cy), focal = camera.centre_px, camera.focal_px
+    place = np.array([[(pixel[0] - cx) / focal, (pixel[1] - cy) / focal]])
+    straight = undistorted(place, camera.distortion) if camera.distortion else place
+    right, back = (place if straight is None else straight)[0]
+    forward, left = -float(back), -float(right)
+    ct, st = math.cos(camera.tilt_rad), math.sin(camera.tilt_rad)
+    cy_, sy_ = math.cos(camera.yaw_rad), math.sin(camera.yaw_rad)
+    forward, up = ct * forward + st, st * forward - ct
+    qx, qy, qz, qw = (float(each) for each in observation.attitude)
+    attitude = (qx, qy, qz, qw)
+    ray = (cy_ * forward - sy_ * left, sy_ * forward + cy_ * left, up)
+    east, north, up = rotate(attitude, ray)
+    x, y, z = np.asarray(observation.position_m) + rotate(attitude, camera.offset_m)
+    x, y, z = float(x), float(y), float(z)
+    far = min(z / -up, FARTHEST_M) if up < 0 else FARTHEST_M
+    return x + far * east, y + far * north, z + far * up

@@ -1,0 +1,310 @@
+"""Starts a companion program beneath simulated time; the simulator runs this file as a script."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import json
+import os
+import runpy
+import socket
+import struct
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+NAME = "_garl_inside"
+HEADER = struct.Struct("!cI")
+MOST_PRINTED = 2_000
+"""Characters of what a program prints between two exchanges that are kept."""
+MOST_FOUND = 50
+"""Markers of one exchange that are told."""
+MOST_SENT = 200_000
+"""Bytes to the vehicle in one exchange: no serial port carries a tenth of it."""
+
+
+def load_inside() -> Any:
+    """Load this folder as a package under a name that no program has."""
+    place = HERE / "__init__.py"
+    spec = importlib.util.spec_from_file_location(
+        NAME, place, submodule_search_locations=[str(HERE)]
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    package = importlib.util.module_from_spec(spec)
+    sys.modules[NAME] = package
+    spec.loader.exec_module(package)
+    for each in ("turns", "network", "sight"):
+        importlib.import_module(f"{NAME}.{each}")
+    return package
+
+
+class Printed(io.TextIOBase):
+    """Standard output and errors of the program: kept in order, of a flood the first part."""
+
+    encoding = "utf-8"
+    errors = "replace"
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+        self.buffer: Any = _Bytes(self)
+        self.texts: list[str] = []
+
+    def write(self, text: str) -> int:
+        """Keep a text."""
+        room = MOST_PRINTED - sum(map(len, self.texts))
+        if room > 0:
+            self.texts.append(text[:room])
+        return len(text)
+
+    def fileno(self) -> int:
+        """Return the number of the real stream, for other programs that are started."""
+        return self._number
+
+    def writable(self) -> bool:
+        """Return that one can write to it."""
+        return True
+
+
+class _Bytes(io.RawIOBase):
+    def __init__(self, text: Printed) -> None:
+        self._text = text
+
+    def write(self, data: Any) -> int:
+        return self._text.write(bytes(data).decode("utf-8", "replace"))
+
+    def writable(self) -> bool:
+        return True
+
+
+class Host:
+    """The simulator's end: asks it for more time, and for frames."""
+
+    def __init__(self, link: socket.socket, settings: dict[str, Any]) -> None:
+        self._link, self._settings = link, settings
+        self._receive, self._send = link.recv_into, link.sendall
+        self.turns = sys.modules[f"{NAME}.turns"].Turns(self.exchange)
+        self.network = sys.modules[f"{NAME}.network"].Network(self.turns)
+        self.sight = sys.modules[f"{NAME}.sight"].Sight(self.turns, self.frame, settings)
+        self.printed = Printed(1)
+        self.links_opened = 0
+
+    def exchange(self) -> None:
+        """Tell what the program did, and wait until the simulator has flown on."""
+        self.tell({})
+        self.get_time()
+
+    def get_time(self) -> None:
+        """Wait until the simulator has flown on."""
+        kind, data = self._read()
+        if kind != b"G":
+            os._exit(0)
+        until_s, number = struct.unpack("!dI", data[:12])
+        self.turns.until_s = until_s
+        mail = bytes(data[12:])
+
+        def arrive() -> None:
+            self.sight.arrived(number)
+            self.network.deliver(mail)
+
+        # Who is due before that has the turn first.
+        self.turns.call_at(until_s, arrive)
+
+    def tell(self, more: dict[str, Any]) -> None:
+        """Write what the program did since the exchange before."""
+        sent, self.network.outbox = b"".join(self.network.outbox), []
+        found, self.sight.found = self.sight.found[:MOST_FOUND], []
+        printed, self.printed.texts = "".join(self.printed.texts), []
+        self.links_opened = max(self.links_opened, len(self.network.to_vehicle))
+        facts = {"printed": printed, "found": found, "links": self.links_opened, **more}
+        text = json.dumps(facts).encode()
+        self._write(b"D", struct.pack("!I", len(text)) + text + sent[:MOST_SENT])
+
+    def wait_for_the_end(self) -> None:
+        """Read until the simulator closes the link: what was told last may not be read yet."""
+        self._link.setblocking(True)
+        while self._receive(bytearray(2**16)):
+            continue
+        os._exit(0)
+
+    def frame(self) -> Any:
+        """Return the newest frame as an array (H, W, 3), blue first."""
+        import numpy as np
+
+        self._write(b"F", b"")
+        _, data = self._read()
+        shape = self._settings["height_px"], self._settings["width_px"], 3
+        return np.frombuffer(data, np.uint8).reshape(shape)
+
+    def _write(self, kind: bytes, data: bytes) -> None:
+        self._send(HEADER.pack(kind, len(data)) + data)
+
+    def _read(self) -> Any:
+        kind, size = HEADER.unpack(self._exactly(HEADER.size))
+        return kind, self._exactly(size)
+
+    def _exactly(self, size: int) -> bytearray:
+        data = bytearray(size)
+        view = memoryview(data)
+        got = 0
+        while got < size:
+            count = self._receive(view[got:])
+            if not count:
+                os._exit(0)  # The simulator is gone.
+            got += count
+        return data
+
+
+class Hooks:
+    """Changes modules when the program has imported them."""
+
+    def __init__(self, changes: dict[str, Callable[[Any], None]]) -> None:
+        self._changes = changes
+
+    def find_spec(self, name: str, path: Any = None, target: Any = None) -> Any:
+        """Return the specification of a module that is changed after its import."""
+        if name not in self._changes:
+            return None
+        change = self._changes.pop(name)
+        spec = importlib.util.find_spec(name)
+        if spec is None or spec.loader is None:
+            return None
+        loader: Any = spec.loader
+        execute = loader.exec_module
+
+        def exec_module(module: Any) -> None:
+            execute(module)
+            change(module)
+
+        loader.exec_module = exec_module
+        return spec
+
+
+def install(host: Host) -> None:
+    """Put simulated time, network and camera beneath Python's library."""
+    parts = ("turns", "network", "sight")
+    turns, network, sight = (sys.modules[f"{NAME}.{each}"] for each in parts)
+    turns.install(host.turns)
+    network.install(host.network)
+    tags = {
+        name: lambda module: sight.change_apriltag(module, host.sight)
+        for name in ("pupil_apriltags", "dt_apriltags", "pyapriltags")
+    }
+    sys.meta_path.insert(
+        0,
+        Hooks(
+            {
+                "cv2": lambda module: sight.change_cv2(module, host.sight),
+                "numpy": lambda module: module.random.seed(0),
+                "serial": lambda module: network.serial_module(host.network, module),
+                **tags,
+            }
+        ),
+    )
+    if importlib.util.find_spec("serial") is None:
+        network.serial_module(host.network, None)
+    import random
+
+    random.seed(0)
+    bits = random.Random(1)
+    changes: Any = os
+    changes.urandom = lambda size: bits.getrandbits(8 * size).to_bytes(size, "big") if size else b""
+    changes.fork = changes.forkpty = _no_fork
+    sys.stdout, sys.stderr = host.printed, host.printed
+    sys.stdin = io.StringIO()
+
+
+def _no_fork() -> int:
+    raise RuntimeError(
+        "the program forks (os.fork, or multiprocessing with its default start method); a copy of "
+        "its process has no place in the flight's time: use a thread, or subprocess"
+    )
+
+
+def run(arguments: list[str]) -> None:
+    """Run a script, or a module with -m, as Python does."""
+    if arguments[0] == "-m":
+        sys.argv = arguments[1:]
+        sys.path.insert(0, str(Path.cwd()))
+        runpy.run_module(arguments[1], run_name="__main__", alter_sys=True)
+        return
+    sys.argv = arguments
+    sys.path.insert(0, str(Path(arguments[0]).resolve().parent))
+    runpy.run_path(arguments[0], run_name="__main__")
+
+
+def failure_of(error: BaseException) -> dict[str, Any]:
+    """Return what is told of an error that ended the program."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [each for each in frames if not _is_carrier(each.filename)]
+    last = own[-1] if own else None
+    inside = [each for each in own if "site-packages" not in each.filename and each.line] or own
+    if inside:
+        last = inside[-1]
+    lines = traceback.format_list(own) + traceback.format_exception_only(type(error), error)
+    return {
+        "error": type(error).__name__,
+        "message": str(error),
+        "where": f"{Path(last.filename).stem}.{last.name}" if last else "",
+        "line": f"{Path(last.filename).name}, line {last.lineno}" if last else "",
+        "trace": "".join(lines)[-20_000:],
+    }
+
+
+def _is_carrier(name: str) -> bool:
+    return name.startswith((str(HERE), "<frozen")) or Path(name).name == "runpy.py"
+
+
+def main() -> None:
+    """Run the program, and tell how it ended."""
+    settings = json.loads(sys.argv[1])
+    link = socket.socket(fileno=settings["link"])
+    _end_with_parent()
+    sys.path[:] = [each for each in sys.path if Path(each or ".").resolve() != HERE]
+    load_inside()
+    host = Host(link, settings)
+    install(host)
+    status: Any = 0
+    failure: dict[str, Any] | None = None
+    try:
+        host.get_time()
+        run(settings["arguments"])
+        _finish()
+    except SystemExit as end:
+        status = end.code
+    except BaseException as error:  # noqa: BLE001 (whatever a program raises is told)
+        failure = failure_of(error)
+        host.printed.write(failure["trace"][-MOST_PRINTED:])
+    if isinstance(status, str):
+        host.printed.write(status)
+    code = status if isinstance(status, int) else int(status is not None)
+    host.tell({"ended": code, "failure": failure})
+    host.wait_for_the_end()
+
+
+def _finish() -> None:
+    """Wait for threads that are no daemons, and run what shall run at the end."""
+    import atexit
+    import threading
+
+    for each in threading.enumerate():
+        if each is not threading.current_thread() and not each.daemon:
+            each.join()
+    atexit._run_exitfuncs()
+
+
+def _end_with_parent() -> None:
+    """Let the system end this process with the simulator's, where it can (Linux)."""
+    import ctypes
+
+    try:
+        ctypes.CDLL(None).prctl(1, 9)
+    except AttributeError:
+        return
+
+
+if __name__ == "__main__":
+    main()

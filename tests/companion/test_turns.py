@@ -1,0 +1,180 @@
+"""Python's clocks, threads, locks and loops in simulated time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.companion.processes import running
+
+
+def test_clocks_tell_the_flights_time_and_sleep_waits_for_it(tmp_path: Path) -> None:
+    text = """
+        import time, datetime
+        began = time.monotonic()
+        time.sleep(0.5)
+        print("slept %.2f %.2f" % (time.monotonic() - began, time.perf_counter() - began))
+        print(time.strftime("%Y", time.gmtime()), time.time() > 1.6e9, time.time_ns() > 1e18)
+        last = time.time()
+        print(all(time.time() > last for _ in range(5)))
+    """
+    with running(tmp_path, text) as simulator:
+        assert simulator.fly(0.45).printed == ""
+        assert simulator.fly(0.2).printed == "slept 0.50 0.50\n2023 True True\nTrue\n"
+        assert simulator.answer is not None
+        assert simulator.answer.status == 0
+
+
+def test_threads_take_turns_in_the_order_of_their_times(tmp_path: Path) -> None:
+    text = """
+        import threading, time
+        def work(name, every):
+            for _ in range(3):
+                time.sleep(every)
+                print(name, "%.2f" % time.monotonic())
+        threads = [threading.Thread(target=work, args=pair) for pair in (("a", 0.2), ("b", 0.25))]
+        for each in threads: each.start()
+        print(threads[0].is_alive(), threading.active_count())
+        for each in threads: each.join()
+        print("joined %.2f" % time.monotonic(), threads[0].is_alive())
+    """
+    with running(tmp_path, text) as simulator:
+        printed = simulator.fly(1.2).printed
+    assert printed.splitlines() == [
+        "True 3",
+        "a 0.20",
+        "b 0.25",
+        "a 0.40",
+        "b 0.50",
+        "a 0.60",
+        "b 0.75",
+        "joined 0.75 False",
+    ]
+
+
+def test_locks_events_and_queues_hand_over_in_order(tmp_path: Path) -> None:
+    text = """
+        import queue, threading, time
+        lock, event, jobs = threading.Lock(), threading.Event(), queue.Queue(maxsize=1)
+        def hold(number):
+            with lock:
+                print("holds", number)
+                time.sleep(0.1)
+        def consume():
+            while (job := jobs.get()) is not None:
+                print("job", job, "%.1f" % time.monotonic())
+            event.set()
+        for number in range(3): threading.Thread(target=hold, args=(number,)).start()
+        threading.Thread(target=consume, daemon=True).start()
+        for job in (1, 2, None):
+            time.sleep(0.2)
+            jobs.put(job)
+        print(event.wait(5), lock.acquire(timeout=0.1), lock.acquire(timeout=0.1))
+        print("%.1f" % time.monotonic())
+        condition = threading.Condition()
+        with condition:
+            print(condition.wait(0.2), threading.Semaphore(0).acquire(timeout=0.1))
+        simple = queue.SimpleQueue()
+        simple.put(1)
+        print(simple.get())
+    """
+    with running(tmp_path, text) as simulator:
+        printed = simulator.fly(2).printed
+    assert printed.splitlines() == [
+        "holds 0",
+        "holds 1",
+        "holds 2",
+        "job 1 0.2",
+        "job 2 0.4",
+        "True True False",
+        "0.7",
+        "False False",
+        "1",
+    ]
+
+
+def test_asyncio_waits_in_the_flights_time_with_executors_too(tmp_path: Path) -> None:
+    text = """
+        import asyncio, time
+        async def tick(name, every):
+            for _ in range(2):
+                await asyncio.sleep(every)
+                print(name, "%.2f" % asyncio.get_running_loop().time())
+        def work():
+            time.sleep(0.35)
+            return 5
+        async def main():
+            await asyncio.gather(tick("a", 0.1), tick("b", 0.15))
+            print(await asyncio.get_running_loop().run_in_executor(None, work))
+            try:
+                await asyncio.wait_for(asyncio.Event().wait(), 0.1)
+            except asyncio.TimeoutError:
+                print("%.1f" % time.monotonic())
+        asyncio.run(main())
+    """
+    with running(tmp_path, text) as simulator:
+        printed = simulator.fly(2).printed
+    assert printed.splitlines() == ["a 0.10", "b 0.15", "a 0.20", "b 0.30", "5", "0.8"]
+
+
+def test_random_numbers_and_the_order_of_sets_are_the_same_in_each_process(tmp_path: Path) -> None:
+    text = """
+        import os, random, uuid
+        import numpy
+        print(random.random(), uuid.uuid4(), os.urandom(4), {"a", "b", "c"}, numpy.random.rand())
+    """
+    printed = []
+    for _ in range(2):
+        with running(tmp_path, text) as simulator:
+            printed.append(simulator.fly(0.1).printed)
+    assert printed[0] == printed[1] != ""
+
+
+def test_a_loop_that_polls_the_clock_ends(tmp_path: Path) -> None:
+    text = """
+        import time, threading
+        done = []
+        threading.Timer(0.05, lambda: done.append(1)).start()
+        while time.time() < 1_700_000_000.1: pass
+        print(done)
+    """
+    with running(tmp_path, text) as simulator:
+        assert simulator.fly(0.3).printed == "[1]\n"
+
+
+def test_an_error_is_told_with_its_line_and_the_status_of_an_exit(tmp_path: Path) -> None:
+    with running(tmp_path, "def f():\n    return {}['id']\nf()\n") as simulator:
+        simulator.fly(0.1)
+        assert simulator.failure == "KeyError: 'id'"
+        assert simulator.answer is not None
+        assert simulator.answer.failure is not None
+        assert simulator.answer.failure["line"] == "lander.py, line 2"
+        assert simulator.answer.failure["where"] == "lander.f"
+        assert "start.py" not in simulator.answer.failure["trace"]
+    with running(tmp_path, "import sys\nsys.exit('no camera')\n") as simulator:
+        simulator.fly(0.1)
+        assert simulator.answer is not None
+        assert (simulator.answer.status, simulator.printed) == (1, "no camera")
+
+
+def test_another_program_runs_at_one_moment_of_the_flight(tmp_path: Path) -> None:
+    text = """
+        import subprocess, time
+        print(subprocess.run(["echo", "out"], capture_output=True, text=True).stdout.strip())
+        began = time.monotonic()
+        child = subprocess.Popen(["cat"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        print(child.communicate(b"in")[0], child.returncode, time.monotonic() - began < 0.1)
+    """
+    with running(tmp_path, text) as simulator:
+        assert simulator.fly(0.3).printed == "out\nb'in' 0 True\n"
+
+
+def test_threads_that_are_no_daemons_run_on_and_functions_at_exit_are_called(
+    tmp_path: Path,
+) -> None:
+    text = """
+        import atexit, threading, time
+        atexit.register(lambda: print("at exit %.1f" % time.monotonic()))
+        threading.Timer(0.3, lambda: print("late")).start()
+    """
+    with running(tmp_path, text) as simulator:
+        assert simulator.fly(1).printed == "late\nat exit 0.3\n"
