@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
@@ -60,6 +61,10 @@ class ExternalProgram(ProgramSystem):
 
     def check(self) -> None:
         """Raise LandingSystemError if its program is not there, or its airframe cannot be flown."""
+        if platform.system() != "Linux":
+            raise LandingSystemError(
+                f"{self.name}: an ExternalProgram flies on Linux only; a class flies elsewhere too"
+            )
         word = self.command[0]
         found = self.folder / word if "/" in word else shutil.which(word)
         if found is None or not Path(found).exists():

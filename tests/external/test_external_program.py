@@ -215,6 +215,12 @@ def test_a_command_is_a_list_of_words() -> None:
         ExternalProgram("./lander")
 
 
+def test_a_program_flies_on_linux_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("platform.system", lambda: "Darwin")
+    with pytest.raises(LandingSystemError, match="on Linux only"):
+        written(tmp_path, "").check()
+
+
 def test_a_program_flies_no_motors(tmp_path: Path) -> None:
     program = written(tmp_path, "", airframe=at_once(control_rate_hz=240.0))
     with pytest.raises(LandingSystemError, match="control_rate_hz"):
