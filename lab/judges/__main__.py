@@ -23,7 +23,7 @@ from types import ModuleType
 from lab.arms import FROZEN
 from lab.faults.catalogue import FAULTS, PLACEBO
 from lab.judges import causes, faults, power, preventable
-from lab.judges.flights import SYSTEMS
+from lab.judges.flights import LANDINGS, SYSTEMS
 from lab.judges.tasks import FOLDER, Task, collect, nice_pool, run
 from lab.table import ResultTable
 
@@ -37,6 +37,7 @@ SUBJECTS = {
     "causes": tuple(SYSTEMS),
     "preventable": tuple(SYSTEMS),
 }
+CHOICES = SUBJECTS | {"causes": (*SYSTEMS, *LANDINGS)}
 
 
 def main() -> None:
@@ -51,7 +52,7 @@ def main() -> None:
         each.add_argument("--arms", nargs="+", default=list(judge.ARMS))
         each.add_argument("--seeds", nargs="+", type=int, default=list(judge.SEEDS))
         each.add_argument(
-            "--on", nargs="+", default=SUBJECTS[name], choices=SUBJECTS[name], metavar="NAME"
+            "--on", nargs="+", default=SUBJECTS[name], choices=CHOICES[name], metavar="NAME"
         )
         each.add_argument("--flights", type=int, default=judge.FLIGHTS)
         each.add_argument("--jobs", type=int, default=2, help="processes; default 2")

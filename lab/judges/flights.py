@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
+from lab.one_search import Flown
+from lab.stand_in import stand_in
+from lab.stand_in_way import ORDINARY, STURDY, LandingModel
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId, search_key
 from pytest_garl.execution.fly_and_judge import fly_job, judged
 from pytest_garl.execution.job import FlightJob
-from pytest_garl.execution.reference import reference_to, system_named
+from pytest_garl.execution.reference import Reference, reference_to, system_named
 from pytest_garl.execution.result import FlightResult
-from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.flight.flight_file import load
+from pytest_garl.landing_system import Airframe, airframe_of
+from pytest_garl.npcs.domain_policy import GRADED
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.fly import fly
@@ -24,38 +30,105 @@ SYSTEMS = {
     "tphyolo": "landing_systems.tphyolo_mls:TphYoloLandingSystem",
     "mm": "landing_systems.mm_mls:MultiModuleLandingSystem",
 }
+LANDINGS = {"ordinary": ORDINARY, "sturdy": STURDY}
+"""Landings of the stand-in, to try a judge on."""
 MAPS = ("court", "lawn")
 MOVED_M = 0.02
 """By so much the start of a twin is moved, in four directions."""
 
 
-class OwnFlights:
-    """Flies jobs one after the other and keeps the records in a folder."""
+class Flights(Protocol):
+    """Flies the scenarios of one landing system on one map, one after the other."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder, self.flown = folder, 0
+    @property
+    def job(self) -> FlightJob:
+        """How the system flies among the NPCs of `field`."""
 
-    def job(self, system: str, map: Map, npcs: PolicySpec) -> FlightJob:
-        """Return the job that flies a landing system "module:Class" on a map."""
-        return FlightJob.for_system(
-            reference_to(system_named(system)), map, npcs, flights=self._folder
-        )
+    @property
+    def airframe(self) -> Airframe | None:
+        """The airframe of the system; None if no director can learn from the flights."""
 
     def __call__(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
         """Fly a scenario as a job says."""
-        self.flown += 1
-        flight = FlightId(search=search_key(str(self.flown)), map=job.map)
+
+    def twins(self, scenario: Scenario) -> Iterator[FlightResult]:
+        """Yield the results of four twins whose UAV starts 2 cm away."""
+
+
+class OwnFlights:
+    """Flights of the simulator in this process; the records are kept in a folder."""
+
+    def __init__(self, system: type, map: Map, folder: Path) -> None:
+        self._system, self._map, self._flown = system, map, 0
+        self.job = FlightJob.for_system(
+            reference_to(system), map, policy_spec(GRADED), flights=folder
+        )
+        self.airframe: Airframe | None = airframe_of(system)
+
+    def __call__(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
+        """Fly a scenario as a job says, and save the record."""
+        self._flown += 1
+        flight = FlightId(search=search_key(str(self._flown)), map=job.map)
         result, sha256, _ = fly_job(job, scenario, flight, None)
         return CompletedFlight(result=result, sha256=sha256, record=job.record(flight))
 
+    def twins(self, scenario: Scenario) -> Iterator[FlightResult]:
+        """Fly the twins, one after the other."""
+        for map in moved(self._map):
+            yield judged(fly(scenario, self._system, self.job.npcs, map=map), DEFAULT_LIMITS)
 
-def moved_twins(system: str, scenario: Scenario, npcs: PolicySpec) -> Iterator[FlightResult]:
-    """Yield the results of four twins whose UAV starts 2 cm away."""
-    map, made = load_map(scenario.map), system_named(system)
+
+class StandInFlights:
+    """Arithmetic in place of flights; nothing is recorded."""
+
+    airframe: Airframe | None = None
+
+    def __init__(self, landing: LandingModel, map: Map, folder: Path) -> None:
+        self._landing, self._map = landing, map
+        self.job = FlightJob.for_system(
+            Reference(module=__name__, file="", qualname="StandIn"),
+            map,
+            policy_spec(GRADED),
+            flights=folder,
+        )
+
+    def __call__(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
+        """Compute what a scenario leads to."""
+        result = stand_in(scenario, self._map, self._landing)
+        return CompletedFlight(result=result, sha256="", record=Path(job.flights, "none"))
+
+    def twins(self, scenario: Scenario) -> Iterator[FlightResult]:
+        """Compute the twins."""
+        return (stand_in(scenario, map, self._landing) for map in moved(self._map))
+
+
+def flights_for(system: str, map: Map, folder: Path) -> Flights:
+    """Return the flights of one of :data:`SYSTEMS`, or of a stand-in."""
+    if system in LANDINGS:
+        return StandInFlights(LANDINGS[system], map, folder)
+    return OwnFlights(system_named(SYSTEMS[system]), map, folder)
+
+
+def fly_each(
+    fly: Flights, latest: list[CompletedFlight], npcs: PolicySpec, scenarios: Sequence[Scenario]
+) -> Iterator[Flown]:
+    """Yield the flights of scenarios; ``latest`` holds the one that was just yielded.
+
+    Its record is kept until the next one is asked for.
+    """
+    for scenario in scenarios:
+        flown = fly(dataclasses.replace(fly.job, npcs=npcs), scenario)
+        latest[:] = [flown]
+        record = load(flown.record) if flown.record.exists() else None
+        yield Flown(result=flown.result, record=record)
+        flown.record.unlink(missing_ok=True)
+
+
+def moved(map: Map) -> Iterator[Map]:
+    """Yield the map with the start 2 cm to the east, west, north and south."""
     x, y, z = map.uav_start_m
     for east, north in ((MOVED_M, 0.0), (-MOVED_M, 0.0), (0.0, MOVED_M), (0.0, -MOVED_M)):
-        moved = dataclasses.replace(map, uav_start_m=(x + east, y + north, z))
-        yield judged(fly(scenario, made, npcs, map=moved), DEFAULT_LIMITS)
+        yield dataclasses.replace(map, uav_start_m=(x + east, y + north, z))
 
 
 def named(**values: Any) -> str:

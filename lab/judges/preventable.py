@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,21 +14,16 @@ from typing import Any
 import numpy as np
 
 from lab.arms import DOMAIN, arm_named
-from lab.judges.flights import MAPS, SYSTEMS, OwnFlights, named
+from lab.judges.flights import MAPS, Flights, flights_for, fly_each, named
 from lab.judges.intervals import over_pairs
-from lab.one_search import Flown, flights_of
+from lab.one_search import flights_of
 from lab.table import ResultTable, Row, share
 from pytest_garl.cases.case_request import CaseRequest
 from pytest_garl.cases.investigation import build_case
 from pytest_garl.execution.flight_id import CompletedFlight
-from pytest_garl.execution.job import FlightJob
-from pytest_garl.execution.reference import system_named
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
 from pytest_garl.flight.thresholds import feet_height_m
-from pytest_garl.landing_system import airframe_of
-from pytest_garl.npcs.domain_policy import GRADED
-from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.genes import OFF, ON
@@ -36,7 +32,6 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import DECIDED, GRADES, STORY_MOMENTS
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.method import FlownScenario, SearchPlan
-from pytest_garl.simulation.npc_policy import PolicySpec
 
 FLIGHTS, GENERATION = 100, 10
 SEEDS = (20,)
@@ -119,12 +114,9 @@ class PreventableTask:
 
     def row(self) -> dict[str, Any]:
         """Fly the scenarios, and make a case of each collision with the NPC."""
-        ends: list[str] = []
         with tempfile.TemporaryDirectory() as folder:
-            fly = OwnFlights(Path(folder))
-            job = fly.job(SYSTEMS[self.system], load_map(self.map), policy_spec(GRADED))
-            for scenario, flown in self._flights(fly, job):
-                ends.append(end_of(scenario, flown, job, fly))
+            fly = flights_for(self.system, load_map(self.map), Path(folder))
+            ends = [end_of(*flown, fly) for flown in self._flights(fly)]
         counts = {
             name: ends.count(name)
             for name in ("counted", "sensor_limited", "unpreventable", "edge", "near_touchdown")
@@ -139,35 +131,24 @@ class PreventableTask:
             "told": f"{counts['counted']} of {collisions} collisions count",
         }
 
-    def _flights(
-        self, fly: OwnFlights, job: FlightJob
-    ) -> Iterator[tuple[Scenario, CompletedFlight]]:
+    def _flights(self, fly: Flights) -> Iterator[tuple[Scenario, CompletedFlight]]:
         """Yield the scenario of each flight, in which nothing is left to decide, and the flight."""
-        arm = arm_named(self.arm)
         scenarios = [
             scenario_of(self.map, self.seed, number, as_gene=self.arm == "gene")
             for number in range(self.flights)
         ]
-        given = dataclasses.replace(arm, make=lambda plan: GivenScenarios(scenarios))
+        arm = dataclasses.replace(arm_named(self.arm), make=lambda plan: GivenScenarios(scenarios))
         map = load_map(self.map)
         plan = SearchPlan(
             map=map, genome=genome_of(DOMAIN, map), seed=self.seed, population=GENERATION
         )
-        airframe = airframe_of(system_named(SYSTEMS[self.system]))
         latest: list[CompletedFlight] = []
-
-        def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[Flown]:
-            for scenario in scenarios:
-                latest[:] = [fly(dataclasses.replace(job, npcs=npcs), scenario)]
-                yield Flown(result=latest[0].result, record=load(latest[0].record))
-                latest[0].record.unlink(missing_ok=True)
-
-        for flight in flights_of(given, plan, self.flights, fly_all, airframe):
-            decided = dict(flight.result.decided)
-            yield flight.scenario.replace(decided), latest[0]
+        fly_all = functools.partial(fly_each, fly, latest)
+        for flight in flights_of(arm, plan, self.flights, fly_all, fly.airframe):
+            yield flight.scenario.replace(dict(flight.result.decided)), latest[0]
 
 
-def end_of(scenario: Scenario, flown: CompletedFlight, job: FlightJob, fly: OwnFlights) -> str:
+def end_of(scenario: Scenario, flown: CompletedFlight, fly: Flights) -> str:
     """Return how a flight ended for the judge; empty without a violation.
 
     "counted", why a collision with the NPC does not count, or "other" for any other violation.
@@ -180,11 +161,11 @@ def end_of(scenario: Scenario, flown: CompletedFlight, job: FlightJob, fly: OwnF
     if is_near_touchdown(load(flown.record)):
         return "near_touchdown"
     request = CaseRequest(
-        name=fly.__class__.__name__,
+        name="judge",
         signature=flown.signature,
         violations=((scenario, flown),),
-        job=job,
-        map=job.load_map(),
+        job=fly.job,
+        map=fly.job.load_map(),
         budget=CASE_FLIGHTS,
     )
     case = build_case(request, fly).case

@@ -17,7 +17,7 @@ from lab.arms import arm_named
 from lab.faults.control import ControlSystem
 from lab.judges import __main__ as command
 from lab.judges import causes, faults, power, preventable, tasks
-from lab.judges.causes import ConfirmedCause, Inventory, Violating, cause_in
+from lab.judges.causes import CausesTask, ConfirmedCause, Inventory, Violating, cause_in
 from lab.judges.faults import FaultTask, twin_of
 from lab.judges.flights import OwnFlights
 from lab.judges.intervals import Estimate, mean_of, over_clusters, over_pairs, p_of_signs
@@ -25,7 +25,6 @@ from lab.judges.preventable import AT_DECISION, is_near_touchdown, scenario_of
 from lab.one_search import Flown, plan_of
 from lab.table import ResultTable
 from pytest_garl import Land, Mission, Observation
-from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.flight.flight import Contact, Flight, Touchdown, Track
@@ -240,35 +239,29 @@ def test_a_cause_names_groups_and_types_without_values_and_numbers() -> None:
     }
 
 
-@pytest.fixture
-def inventory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Inventory:
-    """Return an empty inventory of a system in the tiny simulator, whose twins fail alike."""
-    monkeypatch.setattr(causes, "moved_twins", twins(4))
-    job = FlightJob.for_system(
-        reference_to(Lands),
-        LAWN,
-        policy_spec("stationary"),
-        flights=tmp_path,
-        simulator=reference_to(tiny_simulator.fly),
-    )
-    return Inventory(system="unused", fly=OwnFlights(tmp_path), job=job)
+class TinyFlights(OwnFlights):
+    """Flights of the tiny simulator, of whose twins some violate alike."""
 
+    def __init__(self, folder: Path) -> None:
+        super().__init__(Lands, LAWN, folder)
+        self.job = dataclasses.replace(
+            self.job, npcs=policy_spec("stationary"), simulator=reference_to(tiny_simulator.fly)
+        )
+        self.violating = 4
 
-def twins(violating: int) -> Any:
-    def moved_twins(system: str, scenario: Scenario, npcs: object) -> Iterator[FlightResult]:
-        yield from [flight_result("I:nothing", violation_type="I")] * violating
-        yield from [OK] * (4 - violating)
-
-    return moved_twins
+    def twins(self, scenario: Scenario) -> Iterator[FlightResult]:
+        yield from [flight_result("I:nothing", violation_type="I")] * self.violating
+        yield from [OK] * (4 - self.violating)
 
 
 def add(inventory: Inventory, scenario: Scenario, number: int = 30) -> None:
-    flight = inventory.fly(inventory.job, scenario)
+    flight = inventory.fly(inventory.fly.job, scenario)
     assert flight.result.verdict.violation, scenario
     inventory.add(Violating(number=number, how="bred", scenario=scenario, flight=flight))
 
 
-def test_a_violation_is_shrunk_to_its_cause_which_explains_others(inventory: Inventory) -> None:
+def test_a_violation_is_shrunk_to_its_cause_which_explains_others(tmp_path: Path) -> None:
+    inventory = Inventory(fly=TinyFlights(tmp_path))
     add(inventory, nominal(fog=0.4, rain=0.5, snow=0.2))
     (found,) = inventory.found
     assert found.cause == {"fog"}
@@ -282,15 +275,25 @@ def test_a_violation_is_shrunk_to_its_cause_which_explains_others(inventory: Inv
 
 
 @pytest.mark.parametrize(("violating", "confirmed"), [(2, True), (1, False)])
-def test_two_of_four_twins_confirm_a_cause(
-    violating: int, confirmed: bool, inventory: Inventory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(causes, "moved_twins", twins(violating))
+def test_two_of_four_twins_confirm_a_cause(violating: int, confirmed: bool, tmp_path: Path) -> None:
+    fly = TinyFlights(tmp_path)
+    fly.violating, inventory = violating, Inventory(fly=fly)
     for _ in range(causes.MOST_ASKED + 2):
         add(inventory, nominal(fog=0.4))
     assert len(inventory.causes) == confirmed
     # A signature whose violations nothing confirms is not asked about for ever.
     assert inventory.unconfirmed == (0 if confirmed else causes.MOST_ASKED)
+
+
+@pytest.mark.parametrize("arm", ["garl", "random"])
+def test_a_search_of_the_stand_in_has_causes_beyond_its_control(arm: str) -> None:
+    task = CausesTask(arm=arm, system="ordinary", seed=204, flights=60)
+    row = task.row()
+    assert row == task.row()
+    assert (row["map"], row["control"]) == ("court", 8)
+    assert 0 < row["count"] <= len(row["causes"]) <= row["asked"] <= row["violations"]
+    assert all(8 < each["number"] <= 60 and each["twins"] >= 2 for each in row["causes"])
+    assert row["told"] == f"{row['count']} causes in {row['violations']} violations"
 
 
 def cause_rows(arm: str, counts: dict[tuple[str, str], int]) -> list[Any]:
