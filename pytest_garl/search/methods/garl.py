@@ -72,6 +72,8 @@ class GarlParameters:
     shuffled: bool = False
     """Whether the model is fitted to results that are exchanged among the flights: a placebo, which
     has the same machinery and knows nothing."""
+    model: Callable[[Columns, Matrix, Matrix, Matrix, Matrix], MarginModel] = MarginModel
+    """What predicts the margins of children, fitted to the flights."""
     exploration: Callable[[Columns, Map], Exploration] = Exploration
     """What draws scenarios without parents."""
 
@@ -178,7 +180,7 @@ class Garl:
         if self._parameters.shuffled:
             order = rng.permutation(len(rows))
             proximity, violates, rarity = proximity[order], violates[order], rarity[order]
-        model = MarginModel(self._columns, rows, proximity, violates, rarity)
+        model = self._parameters.model(self._columns, rows, proximity, violates, rarity)
         brood = Evolution(self._columns, self._exploration, model, rows, rng).candidates()
         if not len(brood):
             return
