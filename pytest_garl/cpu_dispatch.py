@@ -83,11 +83,10 @@ def environment_of_programs() -> dict[str, str]:
 
     NumPy passes over names of instructions that it does not know.
     """
-    if not has_baseline():
-        return environment()
-    groups = {**_NUMPY_GROUPS_THEN, **_NUMPY_GROUPS}
+    groups = {**_NUMPY_GROUPS_THEN, **_NUMPY_GROUPS} if has_baseline() else {}
     known = " ".join(name for name, needed in groups.items() if _flags() >= needed)
-    return {**environment(), "NPY_DISABLE_CPU_FEATURES": known, "PYTHONHASHSEED": "0"}
+    numpy = {"NPY_DISABLE_CPU_FEATURES": known} if known else {}
+    return {**environment(), **numpy, "PYTHONHASHSEED": "0"}
 
 
 def was_started_for_flights() -> bool:

@@ -89,7 +89,7 @@ def test_what_it_thinks_is_in_the_record(tmp_path: Path) -> None:
         ("__import__('os').write(link._answers, b'x' * 2**21)", "nonsense", "BadMessage",
          "without the end of a line"),
         ("[link.send('land') or setattr(link, '_frame', 5) for _ in range(99)]", "nonsense",
-         "BadMessage", "was asked"),
+         "BadMessage", "answered the frame 5; expected 6"),
         ("link._frame = 4", "nonsense", "BadMessage", "answered the frame 4; expected 5"),
         ("link._write({'type': 'hover', 'frame': 5})", "nonsense", "BadMessage",
          "position or velocity or attitude or land or abort"),
@@ -115,7 +115,7 @@ def test_what_a_program_does_wrong_is_a_finding(
     assert flight.crash is not None
     assert (flight.crash.kind, flight.crash.error) == (kind, error)
     assert words in flight.crash.message
-    assert len(flight.steps) == 5 or words == "was asked"
+    assert len(flight.steps) == 5 or "expected 6" in words
 
 
 def test_its_last_words_explain_its_death(tmp_path: Path) -> None:
@@ -208,6 +208,19 @@ def test_a_program_that_goes_after_the_check_is_a_finding(tmp_path: Path) -> Non
 )
 def test_a_program_has_the_name_of_what_runs(command: list[str], name: str) -> None:
     assert ExternalProgram(command).name == name
+
+
+def test_what_decides_how_it_flies_is_part_of_its_sources(tmp_path: Path) -> None:
+    """The mount of its camera, its command and its environment, beside the files in its folder."""
+    plain = written(tmp_path, "").source_hashes()
+    assert {"garl_client.py", "lander.py"} < {*plain}
+    tilted = at_once(camera=Camera(tilt_rad=0.5))
+    for changed in ({"airframe": tilted}, {"environment": {"SPEED": "2"}}):
+        hashes = written(tmp_path, "", **changed).source_hashes()
+        assert {name for name in hashes if hashes[name] != plain[name]} == {
+            "the settings of lander"
+        }
+    assert written(tmp_path, "# changed").source_hashes() != plain
 
 
 def test_a_command_is_a_list_of_words() -> None:
