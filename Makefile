@@ -12,6 +12,7 @@ FLIES := $(VENV)/.flies
 READY := $(VENV)/.installed
 CLUSTERS := $(VENV)/.clusters
 ROS := $(VENV)/ros
+DRONEKIT := $(VENV)/dronekit
 ROS_PACKAGES := rclpy rmw-fastrtps-cpp rmw-security-common rosgraph-msgs sensor-msgs geometry-msgs std-msgs
 OTHER := $(VENV)/.other
 RELEASES := $(VENV)/.releases
@@ -21,7 +22,7 @@ SMOKE := .garl/experiment-smoke
 # The tests start some thousand processes; without the compiled files each would parse the sources.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: search test test-others test-other test-long test-ray test-ros2 lint types layers tests bench dist faults experiment-smoke clean
+.PHONY: search test test-others test-other test-long test-ray test-ros2 test-dronekit lint types layers tests bench dist faults experiment-smoke clean
 .DEFAULT_GOAL := help
 
 help:  ## show the commands
@@ -82,6 +83,9 @@ test-ray: $(CLUSTERS)  ## the tests that start Ray clusters: minutes, so not par
 test-ros2: $(READY) $(ROS)/.installed  ## the tests that run a ROS 2 node: 394 MB of wheels for Linux on x86-64
 	ROS_PYTHON=$(ROS)/bin/python $(BIN)/pytest tests/external/test_ros2.py
 
+test-dronekit: $(READY) $(DRONEKIT)/.installed  ## the test that flies real dronekit
+	DRONEKIT_PYTHON=$(DRONEKIT)/bin/python $(BIN)/pytest tests/companion/test_dronekit.py
+
 dist: $(RELEASES)  ## build what is released into dist/, and check it
 	rm -rf dist
 	$(BIN)/python -m hatchling build
@@ -134,6 +138,11 @@ $(CLUSTERS): $(READY)
 	touch $@
 
 # ROS 2 has its own environment, as a user's node has: it flies beside pytest's, not in it.
+$(DRONEKIT)/.installed: | $(READY)
+	$(TESTED) -m venv $(DRONEKIT)
+	$(DRONEKIT)/bin/pip install --quiet --disable-pip-version-check dronekit2
+	touch $@
+
 $(ROS)/.installed: | $(READY)
 	$(TESTED) -m venv $(ROS)
 	$(ROS)/bin/pip install --quiet --disable-pip-version-check $(addprefix ros-,$(ROS_PACKAGES)) numpy

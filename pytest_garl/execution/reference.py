@@ -56,7 +56,7 @@ NOT_HASHED = (
     "testing.py",
 )
 """Folders and modules of this package that start searches or show their results."""
-HASHED_SUFFIXES = (".npz", ".obj", ".py", ".toml")
+HASHED_SUFFIXES = (".hpp", ".npz", ".obj", ".py", ".toml")
 """Files of weights, of meshes, of sources and of maps."""
 
 
