@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,10 +23,19 @@ EXAMPLE = "landing_systems"
 """The folder of the example; a wheel holds it inside of the package, a checkout beside it."""
 IGNORED = ".garl/"
 """Ledgers, records and films of runs: large, and made again by each run."""
-TEST = """\
+IMPORT = """\
 import pytest
 from {module} import {name}
 
+"""
+PROGRAM = """\
+import pytest
+from pytest_garl import Camera, CompanionProgram
+
+# How the program is started, with its arguments, and what its camera is.
+lander = CompanionProgram("python {script}", camera=Camera(width_px=640, height_px=480))
+"""
+TEST = """\
 pytestmark = pytest.mark.garl(system={system}, maps=["court", "lawn"])
 
 
@@ -55,7 +66,7 @@ class _Step:
 
 
 @click.command()
-@click.argument("system", metavar="[MODULE:CLASS]", default="")
+@click.argument("system", metavar="[MODULE:CLASS|SCRIPT]", default="")
 @click.option(
     "--example", is_flag=True, help="Write the three landing systems of the paper and their tests."
 )
@@ -63,8 +74,9 @@ def init(system: str, example: bool) -> None:
     """Write a test file, pytest's settings and a .gitignore entry.
 
     MODULE:CLASS is your landing system, such as my_landing:MyLandingSystem. Without it the command
-    writes one to begin with, my_landing.py, which lands in clear air. Run it in the folder in which
-    you will run pytest. It changes no line that is there; if all is there it changes nothing.
+    writes one to begin with, my_landing.py, which lands in clear air. SCRIPT is a Python program
+    that speaks MAVLink, such as my_lander.py. Run it in the folder in which you will run pytest. It
+    changes no line that is there; if all is there it changes nothing.
     """
     here = Path.cwd()
     settings = find_settings(here)
@@ -83,14 +95,19 @@ def init(system: str, example: bool) -> None:
     if not system:
         system = SKELETON
         steps.append(_write_skeleton(here / f"{SKELETON.partition(':')[0]}.py"))
-    # The import says what is wrong with the name before anything is written with it.
-    imported_system(system)
+    is_script = system.endswith(".py")
+    if not is_script:
+        # The import says what is wrong with the name before anything is written with it.
+        imported_system(system)
+    elif not (here / system).is_file():
+        raise GarlError(f"there is no file {system} in {here}; expected a script, or MODULE:CLASS")
     folder = next((here / path for path in settings.test_paths if (here / path).is_dir()), here)
     test = folder / _test_file(system)
-    wanted = SETTINGS | (PYTHONPATH if _needs_path(system, folder, here) else {})
+    needs_path = not is_script and _needs_path(system, folder, here)
+    wanted = SETTINGS | (PYTHONPATH if needs_path else {})
     steps += [
         _Step(file=settings.file, done=settings.add(wanted)),
-        _write(test, _test_of(system)),
+        _write(test, _test_of_script(here / system, folder) if is_script else _test_of(system)),
         _ignore(here / ".gitignore"),
     ]
     _show(steps, test, here)
@@ -110,7 +127,8 @@ def _show(steps: Sequence[_Step], test: Path, here: Path) -> None:
 
 def _test_file(system: str) -> str:
     """Return the name of the test file of a landing system."""
-    module = system.partition(":")[0].rpartition(".")[2]
+    module = Path(system).stem if system.endswith(".py") else system.partition(":")[0]
+    module = module.rpartition(".")[2]
     name = re.sub(r"\W", "_", module)
     return f"test_{name}.py"
 
@@ -128,7 +146,14 @@ def _needs_path(system: str, folder: Path, here: Path) -> bool:
 def _test_of(system: str) -> str:
     """Return the tests of a landing system, named as MODULE:CLASS."""
     module, _, qualified = system.partition(":")
-    return TEST.format(module=module, name=qualified.partition(".")[0], system=qualified)
+    head = IMPORT.format(module=module, name=qualified.partition(".")[0])
+    return head + TEST.format(system=qualified)
+
+
+def _test_of_script(script: Path, folder: Path) -> str:
+    """Return the tests of a companion program; its path begins at the test file."""
+    path = Path(os.path.relpath(script, folder)).as_posix()
+    return PROGRAM.format(script=shlex.quote(path)) + TEST.format(system="lander")
 
 
 def _write_skeleton(file: Path) -> _Step:

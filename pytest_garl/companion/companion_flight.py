@@ -11,6 +11,8 @@ import signal
 import socket
 import struct
 import subprocess
+import sys
+import time
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -48,7 +50,11 @@ MOST_MESSAGE = 2**24
 """Bytes of a message from the process: all that it may hold is cut before."""
 TARGET_FOR_S = 1.0
 """So long a landing target that the program told of is what it takes for the marker."""
-SAID_BYTES = 4096
+SAID_BYTES = 16_384
+QUIET_S: float | None = 1.5
+STACK_S = 0.1
+"""After so much wall time a program is asked where it is, and so long it has to say it."""
+ASKED = signal.SIGRTMAX - 1
 NOTE_CHARS = 900
 FARTHEST_M = 100.0
 _HEADER = struct.Struct("!cI")
@@ -252,7 +258,7 @@ class CompanionProcess:
             "height_px": camera.height_px,
             "rate_hz": camera.rate_hz,
         }
-        self.ended = False
+        self.ended = self._listens = False
         self._said = b""
         try:
             self._process = subprocess.Popen(
@@ -282,9 +288,12 @@ class CompanionProcess:
         self._write(b"G", struct.pack("!dI", until_s, frame) + data)
         while True:
             kind, answer = self._read()
-            if kind != b"F":
+            if kind == b"D":
                 break
-            self._write(b"", picture())
+            if kind == b"R":
+                self._listens = True
+            else:
+                self._write(b"I", picture())
         with self._refusing_garbage():
             (size,) = struct.unpack_from("!I", answer)
             facts = json.loads(answer[4 : 4 + size])
@@ -325,21 +334,25 @@ class CompanionProcess:
 
     def _write(self, kind: bytes, data: bytes) -> None:
         try:
-            self._link.sendall(_HEADER.pack(kind or b"I", len(data)) + data)
+            self._link.sendall(_HEADER.pack(kind, len(data)) + data)
         except OSError:
             raise self._died() from None
 
     def _read(self) -> tuple[bytes, bytes]:
         with self._refusing_garbage():
             kind, size = _HEADER.unpack(self._exactly(_HEADER.size))
-            if kind not in (b"D", b"F") or size > MOST_MESSAGE:
+            if kind not in (b"D", b"F", b"R") or size > MOST_MESSAGE:
                 raise ValueError(f"a message of type {kind!r} and {size} bytes")
         return kind, self._exactly(size)
 
     def _exactly(self, size: int) -> bytes:
         data = b""
+        quiet_s = QUIET_S
         while len(data) < size:
-            ready = {key.fd for key, _ in self._wait.select()}
+            ready = {key.fd for key, _ in self._wait.select(quiet_s)}
+            if not ready and quiet_s is not None:
+                quiet_s = None
+                self._tell_where_it_is()
             if self._output in ready:
                 self._read_output()
             if self._link.fileno() in ready:
@@ -351,6 +364,20 @@ class CompanionProcess:
                     raise self._died()
                 data += part
         return data
+
+    def _tell_where_it_is(self) -> None:
+        """Say on stderr what the program computes: if it hangs, the report has that line."""
+        if not self._listens:
+            return  # It would end by the signal.
+        self._process.send_signal(ASKED)
+        self._wait.select(QUIET_S)
+        time.sleep(STACK_S)
+        self._read_output()
+        stack = self._said.decode(errors="replace").rpartition("Current thread")[2]
+        places = [line.strip() for line in stack.splitlines() if line.startswith("  File")]
+        own = [each for each in places if str(RUNNER.parent) not in each]
+        at = f", at {own[0]}" if own else ""
+        sys.stderr.write(f"{self._name} computes without waiting for anything{at}\n")
 
     def _read_output(self) -> None:
         """Take what was written past Python's ``sys.stdout``: it may not block the process."""

@@ -20,6 +20,8 @@ VEHICLE_PORTS = (*range(5760, 5780), *range(14500, 14700))
 """Where the vehicle listens, and where a program that listens hears it: MAVLink's usual ports."""
 VEHICLE = ("127.0.0.1", 14555)
 LARGEST = 65_507
+_modules_own: Any = socket
+"""Before Python 3.10 its ``timeout`` was no ``TimeoutError``."""
 Address = tuple[str, int]
 _RealSocket = socket.socket
 _real_select = select.select
@@ -262,7 +264,7 @@ class Socket(_RealSocket):
         if not ready:
             if self._waits_s == 0:
                 raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
-            raise TimeoutError("timed out")
+            raise _modules_own.timeout("timed out")
         return self._inbox.popleft() if self._inbox else (b"", None)
 
     def getsockname(self) -> Any:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import faulthandler
 import importlib.util
 import io
 import json
 import os
 import runpy
+import signal
 import socket
 import struct
 import sys
@@ -17,6 +19,8 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 NAME = "_garl_inside"
+ASKED = signal.SIGRTMAX - 1
+"""The simulator's question where the program is, when it computes for long."""
 HEADER = struct.Struct("!cI")
 MOST_PRINTED = 2_000
 """Characters of what a program prints between two exchanges that are kept."""
@@ -260,8 +264,11 @@ def _is_carrier(name: str) -> bool:
 
 def main() -> None:
     """Run the program, and tell how it ended."""
+    faulthandler.enable(2)
+    faulthandler.register(ASKED, 2)
     settings = json.loads(sys.argv[1])
     link = socket.socket(fileno=settings["link"])
+    link.sendall(HEADER.pack(b"R", 0))
     _end_with_parent()
     sys.path[:] = [each for each in sys.path if Path(each or ".").resolve() != HERE]
     load_inside()
