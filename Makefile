@@ -22,7 +22,7 @@ SMOKE := .garl/experiment-smoke
 # The tests start some thousand processes; without the compiled files each would parse the sources.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: search test test-others test-other test-long test-ray test-ros2 test-dronekit lint types layers tests bench dist faults experiment-smoke clean
+.PHONY: search test test-others test-other test-long test-ray test-ros test-dronekit lint types layers tests bench dist faults experiment-smoke clean
 .DEFAULT_GOAL := help
 
 help:  ## show the commands
@@ -80,7 +80,7 @@ test-long: $(READY)  ## the tutorial, 50 kills, 154 misbehaving systems, more fu
 test-ray: $(CLUSTERS)  ## the tests that start Ray clusters: minutes, so not part of `test`
 	$(BIN)/pytest -m ray tests
 
-test-ros2: $(READY) $(ROS)/.installed  ## the tests that run a ROS 2 node: 394 MB of wheels for Linux on x86-64
+test-ros: $(READY) $(ROS)/.installed  ## the tests that run a ROS 2 node: 394 MB of wheels for Linux on x86-64
 	ROS_PYTHON=$(ROS)/bin/python $(BIN)/pytest tests/external/test_ros2.py
 
 test-dronekit: $(READY) $(DRONEKIT)/.installed  ## the test that flies real dronekit

@@ -1,6 +1,6 @@
 """A plain rclpy node in lock-step: the bytes of its rule in a class.
 
-``make test-ros2`` installs rclpy (394 MB of wheels) and sets ROS_PYTHON to the Python that has it.
+``make test-ros`` installs rclpy (394 MB of wheels) and sets ROS_PYTHON to the Python that has it.
 """
 
 from __future__ import annotations
