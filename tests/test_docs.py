@@ -18,6 +18,7 @@ FORMS = sorted((DOCS.parent / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
 @pytest.mark.parametrize(
     ("schema", "file"),
     [
+        ("vendor.github-actions", DOCS.parent / "action.yml"),
         ("vendor.github-workflows", DOCS / "github-actions.yml"),
         ("vendor.github-workflows", DOCS.parent / ".github" / "workflows" / "release.yml"),
         *(

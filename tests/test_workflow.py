@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shlex
 import subprocess
 import sys
 import tomllib
@@ -27,8 +26,27 @@ JOBS = WORKFLOW["jobs"]
 SUPPORT = Path(__file__).with_name("support")
 
 
-def commands(job: str) -> list[str]:
-    return [step["run"].strip() for step in JOBS[job]["steps"] if "run" in step]
+ACTION: dict[str, Any] = YAML(typ="safe").load(ROOT / "action.yml")
+STEPS = ACTION["runs"]["steps"]
+
+
+def inputs(job: str) -> dict[str, str]:
+    """Return what a job gives to the action, and the defaults of the rest."""
+    (step,) = (step for step in JOBS[job]["steps"] if "with" in step)
+    assert step["uses"] == "OWNER/pytest-garl@COMMIT"
+    assert set(step["with"]) <= set(ACTION["inputs"])
+    return {name: each["default"] for name, each in ACTION["inputs"].items()} | step["with"]
+
+
+def command(name: str, job: str) -> tuple[str, dict[str, str]]:
+    """Return what a step of the action runs for a job, and its environment."""
+    (step,) = (step for step in STEPS if step.get("name") == name)
+    given = inputs(job)
+    environment = {
+        key: re.sub(r"\$\{\{ inputs\.(\S+) \}\}", lambda found: given[found[1]], value)
+        for key, value in step.get("env", {}).items()
+    }
+    return step["run"], environment
 
 
 @pytest.fixture
@@ -46,15 +64,19 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def sh(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
+def sh(name: str, job: str, folder: Path, **changed: str) -> subprocess.CompletedProcess[str]:
+    """Run a step of the action for a job, as GitHub does."""
+    run, given = command(name, job)
     environment = {
         **os.environ,
         "CI": "true",
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         "PYTHONPATH": str(SUPPORT),
+        **given,
+        **changed,
     }
     return subprocess.run(
-        ["bash", "-ec", command],
+        ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", run],
         cwd=folder,
         env=environment,
         capture_output=True,
@@ -64,31 +86,47 @@ def sh(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_gate_of_a_pull_request_is_green_in_a_project_without_cases(project: Path) -> None:
-    _, *steps = commands("gate")
-    assert [step.split()[0] for step in steps] == ["garl", "pytest"]
-    for step in steps:
-        done = sh(step, project)
+    for name in ("Check the saved cases", "Fly"):
+        done = sh(name, "gate", project)
         assert done.returncode == 0, done.stdout + done.stderr
     assert (project / "report.xml").is_file()
 
 
 def test_search_of_the_night_leaves_what_is_uploaded(project: Path) -> None:
-    _, step = commands("search")
+    wanted = inputs("search")["arguments"]
     # So few flights take seconds.
-    done = sh(step.replace("=400", "=8").replace("=random", "=0"), project)
+    few = wanted.replace("=400", "=8").replace("=random", "=0")
+    assert few != wanted
+    done = sh("Fly", "search", project, ARGUMENTS=few)
     assert done.returncode == 1, done.stdout + done.stderr
-    uploaded = JOBS["search"]["steps"][-1]["with"]["path"].split()
+    uploaded = STEPS[-1]["with"]["path"].split()
     assert [path for path in uploaded if not (project / path).exists()] == []
 
 
+def test_arguments_of_the_action_are_words_of_a_shell(project: Path) -> None:
+    done = sh("Fly", "gate", project, ARGUMENTS="-k 'time and nothing' --co -q")
+    assert "test_lands_in_time" in done.stdout
+    assert "test_collides" not in done.stdout
+
+
+def test_jobs_upload_under_names_of_their_own() -> None:
+    assert len({inputs(job)["artefact"] for job in JOBS}) == len(JOBS)
+
+
 @pytest.mark.parametrize(("job", "extras"), [("gate", set()), ("search", {"video"})])
-def test_install_line_is_one_that_pip_understands(job: str, extras: set[str]) -> None:
-    found = shlex.split(commands(job)[0].replace("$PYTEST_GARL", WORKFLOW["env"]["PYTEST_GARL"]))
-    assert found[:4] == ["pip", "install", "-c", "constraints.txt"]
-    wanted = Requirement(found[4])
-    assert (wanted.name, wanted.extras) == ("pytest-garl", extras)
-    assert wanted.url == "git+https://HOST/PATH.git@COMMIT"
-    assert (ROOT / "constraints.txt").is_file()
+def test_action_installs_itself_with_its_versions(
+    job: str, extras: set[str], tmp_path: Path
+) -> None:
+    (tmp_path / "pip").write_text('#!/bin/sh\nprintf "%s\\n" "$@"\n')
+    (tmp_path / "pip").chmod(0o755)
+    path = f"{tmp_path}{os.pathsep}{os.environ['PATH']}"
+    done = sh(
+        "Install", job, tmp_path, PATH=path, GITHUB_ACTION_PATH=str(ROOT), INSTALL="echo 'mine too'"
+    )
+    first, *_, versions, requirement, mine = done.stdout.splitlines()
+    assert (first, versions, mine) == ("install", str(ROOT / "constraints.txt"), "mine too")
+    wanted = Requirement(requirement)
+    assert (wanted.name, wanted.extras, wanted.url) == ("pytest-garl", extras, f"file://{ROOT}")
 
 
 def test_every_install_line_of_the_pages_names_extras_that_exist() -> None:
@@ -105,11 +143,33 @@ def test_every_install_line_of_the_pages_names_extras_that_exist() -> None:
     assert [line for line in lines if re.search(r"pytest-garl(?!\[|.* @ )", line)] == []
 
 
-def test_workflow_takes_a_python_that_is_supported() -> None:
+def test_action_takes_a_python_that_is_supported() -> None:
     allowed = SpecifierSet(
         tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["requires-python"]
     )
-    setups = [step for job in JOBS.values() for step in job["steps"] if "setup-python" in str(step)]
-    assert setups
-    for setup in setups:
-        assert setup["with"]["python-version"] in allowed
+    python = ACTION["inputs"]["python-version"]
+    assert python["default"] in allowed
+    assert [each for each in re.findall(r"3\.\d+", python["description"]) if each in allowed]
+
+
+def settings_of_the_page() -> str:
+    (block,) = re.findall(r"```toml\n(.*?)```", (ROOT / "docs" / "ci.md").read_text(), re.S)
+    return str(block)
+
+
+def test_settings_of_the_page_are_all_there_are(project: Path) -> None:
+    named = re.findall(r"^(?:# )?(garl_[\w-]+) = ", settings_of_the_page(), re.M)
+    shown = subprocess.run(
+        [sys.executable, "-m", "pytest", "--help"], capture_output=True, text=True, check=True
+    ).stdout
+    assert sorted(named) == sorted(re.findall(r"^  (garl_[\w-]+) \(", shown, re.M))
+
+
+def test_settings_of_the_page_are_the_defaults(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # It says that the tests of this project fly no probes.
+    monkeypatch.delenv("PYTEST_ADDOPTS")
+    config = pytester.parseconfig()
+    defaults = tomllib.loads(settings_of_the_page())["tool"]["pytest"]["ini_options"]
+    assert {name: config.getini(name) or value for name, value in defaults.items()} == defaults
