@@ -16,13 +16,14 @@ DRONEKIT := $(VENV)/dronekit
 ROS_PACKAGES := rclpy rmw-fastrtps-cpp rmw-security-common rosgraph-msgs sensor-msgs geometry-msgs std-msgs
 OTHER := $(VENV)/.other
 RELEASES := $(VENV)/.releases
+SITE := $(VENV)/.site
 CHECKS := $(VENV)/checks.log
 SMOKE := .garl/experiment-smoke
 
 # The tests start some thousand processes; without the compiled files each would parse the sources.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: search test test-others test-other test-long test-ray test-ros test-dronekit lint types layers tests bench dist faults experiment-smoke clean
+.PHONY: search test test-others test-other test-long test-ray test-ros test-dronekit lint types layers tests bench docs dist faults experiment-smoke clean
 .DEFAULT_GOAL := help
 
 help:  ## show the commands
@@ -86,6 +87,10 @@ test-ros: $(READY) $(ROS)/.installed  ## the tests that run a ROS 2 node: 394 MB
 test-dronekit: $(READY) $(DRONEKIT)/.installed  ## the test that flies real dronekit
 	DRONEKIT_PYTHON=$(DRONEKIT)/bin/python $(BIN)/pytest tests/companion/test_dronekit.py
 
+# A warning is an error: a link to a page, a heading or a file that is not there.
+docs: $(SITE)  ## make a site with a search of the pages, in build/docs
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going -c docs/site . build/docs
+
 dist: $(RELEASES)  ## build what is released into dist/, and check it
 	rm -rf dist
 	$(BIN)/python -m hatchling build
@@ -125,6 +130,11 @@ $(READY): pyproject.toml constraints.txt
 $(OTHER): pyproject.toml constraints.txt
 	$(ANEW)
 	$(INSTALL) -e '.[dev]'
+	touch $@
+
+# Only the site needs Sphinx.
+$(SITE): $(READY)
+	$(INSTALL) -e '.[dev,train,docs]'
 	touch $@
 
 # Only a release needs Twine.

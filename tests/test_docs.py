@@ -75,3 +75,23 @@ def test_counts_in_remarks_agree_with_the_rows() -> None:
         assert sum(map(int, kinds.values())) == row.violations
         assert int(line["aborted"]) == row.aborted
         assert row.violations + row.aborted + int(line["landed"]) == row.budget
+
+
+@pytest.mark.long
+def test_site_of_the_pages_has_no_warning(tmp_path: Path) -> None:
+    pytest.importorskip("sphinx")
+    site = tmp_path / "site"
+    command = ["sphinx", "--quiet", "--fail-on-warning", "--keep-going", "-c", "docs/site"]
+    done = subprocess.run(
+        [sys.executable, "-m", *command, "-d", str(tmp_path / "read"), ".", str(site)],
+        cwd=DOCS.parent,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    index = (site / "docs" / "index.html").read_text()
+    for page in DOCS.glob("*.md"):
+        assert page.stem == "index" or f'href="{page.stem}.html"' in index
+    assert (site / "searchindex.js").is_file()
+    assert (site / "README.html").is_file()
