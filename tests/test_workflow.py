@@ -35,7 +35,7 @@ def inputs(job: str) -> dict[str, str]:
     (step,) = (step for step in JOBS[job]["steps"] if "with" in step)
     assert step["uses"] == "OWNER/pytest-garl@COMMIT"
     assert set(step["with"]) <= set(ACTION["inputs"])
-    return {name: each["default"] for name, each in ACTION["inputs"].items()} | step["with"]
+    return {**{name: each["default"] for name, each in ACTION["inputs"].items()}, **step["with"]}
 
 
 def command(name: str, job: str) -> tuple[str, dict[str, str]]:

@@ -434,7 +434,7 @@ def _detection(
     number: int, corners: list[tuple[float, float]], observation: Observation, camera: Camera
 ) -> Detection:
     """Return a marker that the program's detector found, where its middle meets the ground."""
-    u, v = (sum(each) / max(1, len(corners)) for each in zip(*corners, strict=True))
+    u, v = (math.fsum(each) / max(1, len(corners)) for each in zip(*corners, strict=True))
     return Detection(
         marker_id=number if abs(number) < 2**31 else -1,
         confidence=1.0,
