@@ -72,6 +72,14 @@ class Rows:
         return self.rows
 
 
+class _Connection(sqlite3.Connection):
+    """A connection that closes itself if an error left it open: since 3.13 Python warns of it."""
+
+    def __del__(self) -> None:
+        with contextlib.suppress(sqlite3.Error):
+            self.close()
+
+
 class Database:
     """A connection to a ledger's file; its errors are LedgerErrors.
 
@@ -81,7 +89,9 @@ class Database:
     def __init__(self, path: Path, on_locked: Callable[[], None] = lambda: None) -> None:
         self.path, self.on_locked = path, on_locked
         with self._explained():
-            self._connection = sqlite3.connect(path, timeout=_BUSY_S, isolation_level=None)
+            self._connection = sqlite3.connect(
+                path, timeout=_BUSY_S, isolation_level=None, factory=_Connection
+            )
             self._connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST)
         self.execute("PRAGMA journal_mode=WAL")
         self.execute("PRAGMA synchronous=NORMAL")
@@ -116,11 +126,6 @@ class Database:
     def close(self) -> None:
         """Close the file."""
         self._connection.close()
-
-    def __del__(self) -> None:
-        """Close the file of a ledger that an error left open: since 3.13 Python warns of it."""
-        with contextlib.suppress(AttributeError, sqlite3.Error):
-            self._connection.close()
 
     @contextmanager
     def transaction(self) -> Iterator[None]:

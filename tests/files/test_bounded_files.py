@@ -81,5 +81,5 @@ def test_the_error_is_of_the_wanted_kind_and_ends_with_the_hint(tmp_path: Path) 
     (tmp_path / "a").write_bytes(b"\xff")
     with pytest.raises(PolicyError, match=r"; expected a manifest$"):
         read_text(tmp_path / "a", error=PolicyError, hint="; expected a manifest")
-    with pytest.raises(PolicyError, match="embedded null byte"):
+    with pytest.raises(PolicyError, match="embedded null"):
         read_text(Path("a\0b"), error=PolicyError)
