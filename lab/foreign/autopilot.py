@@ -29,20 +29,11 @@ from pytest_garl import (
     PositionSetpoint,
     VehicleState,
 )
-from pytest_garl.vehicle import (
-    ArduPilotControl,
-    ArduPilotParameters,
-    tuned,
-    vehicle_of,
-)
-from pytest_garl.vehicle.rotations import yaw_of
+from pytest_garl.vehicle import ArduPilotParameters, tuned, vehicle_of
+from pytest_garl.vehicle.autopilot import FEET_M, AirborneControl
+from pytest_garl.vehicle.ned import heading_of, on_globe, on_map
 
 CONTROL_RATE_HZ = 240.0
-BODY_ABOVE_FEET_M = 0.2
-"""Height of the vehicle's position while it stands."""
-EARTH_RADIUS_M = 6_378_137.0
-ORIGIN_DEG = (47.0, 8.0)
-"""Latitude and longitude of the told coordinate: any place that is not near a pole."""
 LEVEL_FRAME = "MAV_FRAME_LOCAL_FRD"
 """ArduPilot takes angles in this frame as those of a camera that is held level, and turns those in
 other frames by the vehicle's attitude."""
@@ -57,25 +48,6 @@ class GlobalPosition:
     lat: float
     lon: float
     alt: float
-
-
-class AirborneControl(ArduPilotControl):
-    """ArduPilot's flight control, taken over in the air."""
-
-    def hover(self, state: VehicleState) -> None:
-        """Hold this place in GUIDED, with the motors at the throttle that carries the vehicle."""
-        x, y, z = state.position_m
-        vx, vy, vz = state.velocity_mps
-        self._state, self._time_s = state, state.time_s
-        while self._spool.update(True) != "unlimited":
-            pass
-        self._lifted, self._ground_m = True, BODY_ABOVE_FEET_M
-        self._horizontal.reset((x, y), (vx, vy))
-        self._vertical.reset(z, vz, self.parameters.mot_thst_hover)
-        self._motors.reset(state.attitude)
-        self._detector.reset(landed=False)
-        self.mode = "guided"
-        self.guide(position=(x, y, z), yaw=yaw_of(state.attitude))
 
 
 class Autopilot:
@@ -107,7 +79,7 @@ class Autopilot:
         """Fly the motors for one control step."""
         if not self._flies:
             self._flies = True
-            self._control.hover(state)
+            self._control.hover(state, FEET_M)
         while self._orders and self._orders[0][0] <= state.time_s:
             self._orders.popleft()[1]()
         return self._control.control(state)
@@ -127,19 +99,14 @@ class Autopilot:
     @property
     def heading_rad(self) -> float:
         """The nose's direction, clockwise from north, from -pi to pi."""
-        return math.remainder(math.pi / 2 - self.yaw_rad, math.tau)
+        return heading_of(self.yaw_rad)
 
     @property
     def global_position(self) -> GlobalPosition:
         """Where the vehicle believes to be, in degrees."""
         x, y, z = self.position_m
-        east, north = x - self._origin[0], y - self._origin[1]
-        lat, lon = ORIGIN_DEG
-        return GlobalPosition(
-            lat=lat + math.degrees(north / EARTH_RADIUS_M),
-            lon=lon + math.degrees(east / (EARTH_RADIUS_M * math.cos(math.radians(lat)))),
-            alt=z,
-        )
+        lat, lon = on_globe(x - self._origin[0], y - self._origin[1])
+        return GlobalPosition(lat=lat, lon=lon, alt=z)
 
     @property
     def precision_status(self) -> str:
@@ -148,9 +115,7 @@ class Autopilot:
 
     def place_of(self, goal: GlobalPosition) -> Place:
         """Return a global position as east, north, up."""
-        lat, lon = ORIGIN_DEG
-        north = math.radians(goal.lat - lat) * EARTH_RADIUS_M
-        east = math.radians(goal.lon - lon) * EARTH_RADIUS_M * math.cos(math.radians(lat))
+        east, north = on_map(goal.lat, goal.lon)
         return self._origin[0] + east, self._origin[1] + north, goal.alt
 
     def beside(self, forward_m: float, right_m: float) -> tuple[float, float]:
