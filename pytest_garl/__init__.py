@@ -36,6 +36,7 @@ _HOMES = {
     "pytest_garl.flight.flight": ("Flight",),
     "pytest_garl.simulation.npc_policy": ("Move", "PolicySpec", "Situation"),
     "pytest_garl.vehicle.autopilot": ("ArduCopter",),
+    "pytest_garl.vehicle.px4": ("Px4Copter",),
     "pytest_garl.verdicts.verdict": ("Limits", "limits"),
     "pytest_garl.reports.film": ("save_video",),
 }

@@ -25,6 +25,7 @@ from pytest_garl.reports.film import save_video
 from pytest_garl.scenarios.task import Start
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from pytest_garl.vehicle.autopilot import ArduCopter
+from pytest_garl.vehicle.px4 import Px4Copter
 from pytest_garl.verdicts.verdict import Limits
 
 __version__: str
@@ -53,6 +54,7 @@ __all__ = [
     "Observation",
     "PolicySpec",
     "PositionSetpoint",
+    "Px4Copter",
     "Rangefinder",
     "Situation",
     "Start",

@@ -36,9 +36,10 @@ from pytest_garl.landing_system import (
     VehicleState,
 )
 from pytest_garl.program import ProgramFailedError
-from pytest_garl.vehicle.autopilot import ArduCopter, Autopilot
+from pytest_garl.vehicle.autopilot import ArduCopter
 from pytest_garl.vehicle.mavlink import MavlinkLink
 from pytest_garl.vehicle.ned import on_globe
+from pytest_garl.vehicle.px4 import Px4Copter
 from pytest_garl.vehicle.rotations import rotate
 
 RUNNER = Path(__file__).with_name("inside") / "start.py"
@@ -95,14 +96,14 @@ def mission_facts(mission: Mission | None, camera: Camera) -> dict[str, object]:
 class CompanionFlight:
     """A landing system: the program decides, the autopilot flies the motors."""
 
-    def __init__(self, start: Start, airframe: Airframe, vehicle: ArduCopter) -> None:
+    def __init__(self, start: Start, airframe: Airframe, vehicle: ArduCopter | Px4Copter) -> None:
         self._start, self._airframe, self._vehicle = start, airframe, vehicle
         self._process: CompanionProcess | None = None
 
     def reset(self, mission: Mission) -> None:
         """Start the program for one flight."""
         self.close()
-        self._autopilot = Autopilot(self._airframe, mission, self._vehicle)
+        self._autopilot = self._vehicle.autopilot(self._airframe, mission)
         self._outbox: list[bytes] = []
         self._link = MavlinkLink(self._autopilot, self._outbox.append)
         self._inbox: deque[tuple[float, bytes]] = deque()
@@ -111,7 +112,6 @@ class CompanionFlight:
         self._observation: Observation | None = None
         self._seen: list[Detection] = []
         self._printed: list[str] = []
-        self._target: tuple[float, tuple[float, float, float]] | None = None
         self._process = CompanionProcess(self._start, self._airframe.camera, mission)
 
     def step(self, observation: Observation) -> Command:
@@ -190,12 +190,7 @@ class CompanionFlight:
         """Return the diagnostics: nothing of it was said by the program for our sake."""
         seen, self._seen = self._seen, []
         pilot = self._autopilot
-        if pilot.target_m is not None:
-            self._target = (observation.time_s, pilot.target_m)
-            pilot.target_m = None
-        target = None
-        if self._target is not None and observation.time_s - self._target[0] < TARGET_FOR_S:
-            target = self._target[1]
+        fresh = observation.time_s - pilot.target_s < TARGET_FOR_S
         notes = []
         if seen:
             ids = ", ".join(str(each.marker_id) for each in seen[:20])
@@ -206,7 +201,7 @@ class CompanionFlight:
         return Diagnostics(
             phase=pilot.phase,
             detections=tuple(seen[:100]),
-            target_m=target,
+            target_m=pilot.target_m if fresh else None,
             note=cut("\n".join(notes), NOTE_CHARS),
         )
 

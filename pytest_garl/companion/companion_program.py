@@ -18,6 +18,7 @@ from pytest_garl.messages import listed, shown
 from pytest_garl.program import ProgramSystem
 from pytest_garl.vehicle.autopilot import ArduCopter
 from pytest_garl.vehicle.mavlink import dialect
+from pytest_garl.vehicle.px4 import Px4Copter
 
 Windows = Literal["refuse", "ignore"]
 
@@ -51,7 +52,7 @@ class CompanionProgram(ProgramSystem):
         command: str,
         *,
         camera: Camera | None = None,
-        vehicle: ArduCopter | None = None,
+        vehicle: ArduCopter | Px4Copter | None = None,
         airframe: Airframe | None = None,
         python: str | Path | None = None,
         windows: Windows = "refuse",
@@ -79,7 +80,7 @@ class CompanionProgram(ProgramSystem):
                 plain, camera=camera or plain.camera, control_rate_hz=MAX_RATE_HZ
             ),
         )
-        self.vehicle = vehicle or ArduCopter()
+        self.vehicle: ArduCopter | Px4Copter = vehicle or ArduCopter()
         self.python, self.windows = str(python or first), windows
         self.environment = dict(environment or {})
         script = self.folder / self.arguments[0]
@@ -87,6 +88,7 @@ class CompanionProgram(ProgramSystem):
             self.home = script.resolve().parent
         self.settings = (
             command,
+            type(self.vehicle).__name__,
             dataclasses.astuple(self.vehicle),
             windows,
             tuple(sorted(self.environment.items())),

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from pytest_garl.airframe import Airframe
 from pytest_garl.errors import LandingSystemError
@@ -85,6 +85,10 @@ class ArduCopter:
             )
         check_names(self.parameters)
 
+    def autopilot(self, airframe: Airframe, mission: Mission) -> Autopilot:
+        """Return the vehicle of one flight."""
+        return Autopilot(airframe, mission, self)
+
 
 class AirborneControl(ArduPilotControl):
     """ArduPilot's flight control, which can begin in the air."""
@@ -115,19 +119,33 @@ class Autopilot:
     ``state`` is its estimate of its state, of the last control step.
     """
 
-    def __init__(self, airframe: Airframe, mission: Mission, vehicle: ArduCopter) -> None:
-        self.parameters = Parameters(vehicle_of(airframe).hover_throttle, vehicle.parameters)
+    first_mode, air_mode = "STABILIZE", "GUIDED"
+    """The mode on the ground, and that of a flight that begins in the air."""
+    guided_modes: tuple[str, ...] = ("GUIDED",)
+    """The modes in which setpoints are flown."""
+    kind = "MAV_AUTOPILOT_ARDUPILOTMEGA"
+    pilot_modes: Mapping[str, str] = {"LAND": "LAND", "LOITER": "LOITER"}
+    """What the human pilot switches to."""
+
+    def __init__(self, airframe: Airframe, mission: Mission, vehicle: Any) -> None:
+        throttle = vehicle_of(airframe).hover_throttle
+        self.parameters = self._new_parameters(throttle, vehicle.parameters)
         self._airframe, self._mission, self._pilot = airframe, mission, vehicle.pilot
         self._control = AirborneControl(airframe, self.parameters.flown)
         self._ground_m = FEET_M
         x, y, _ = mission.home_m
         self.home_m: Vector = (x, y, FEET_M)
-        ox, oy = mission.gps_position_m if vehicle.origin == "coordinate" else (x, y)
+        at_coordinate = getattr(vehicle, "origin", "home") == "coordinate"
+        ox, oy = mission.gps_position_m if at_coordinate else (x, y)
         self.origin_m: Vector = (ox, oy, FEET_M)
-        self.mode = "GUIDED" if vehicle.pilot else "STABILIZE"
+        self.mode = self.air_mode if vehicle.pilot else self.first_mode
         self.armed = False
         self.state: VehicleState | None = None
         self._armed_s = 0.0
+        self._has_flown = False
+        self.target_m: Vector | None = None
+        """Where the last measurement of the landing target was, as of ``target_s``."""
+        self.target_s = -math.inf
         self._goal: Vector | None = None
         self._turn: tuple[float, float] = (0.0, 0.0)
         self._return: Callable[[VehicleState], None] | None = None
@@ -135,7 +153,20 @@ class Autopilot:
         self.told: list[str] = []
         """What STATUSTEXT shall say next."""
 
-    # The state, as ArduPilot tells it.
+    def _new_parameters(self, hover_throttle: float, changes: Mapping[str, float]) -> Parameters:
+        return Parameters(hover_throttle, changes)
+
+    # The state, as it is told.
+
+    @property
+    def mode_number(self) -> int:
+        """The mode as HEARTBEAT tells it."""
+        return MODES[self.mode]
+
+    def mode_of(self, number: float, sub: float = 0.0) -> str:
+        """Return the mode of a number in a command; empty if there is none."""
+        del sub
+        return next((name for name, each in MODES.items() if each == int(number)), "")
 
     @property
     def now(self) -> VehicleState:
@@ -202,7 +233,8 @@ class Autopilot:
         if mode == "LAND":
             self._control.land()
         elif mode == "RTL":
-            self._begin_return()
+            p = self.parameters
+            self._begin_return(p["RTL_ALT"] / 100, p["RTL_LOIT_TIME"] / 1000)
         elif self._control.flying:
             # GUIDED holds the place until it is told one.
             self._hold()
@@ -210,12 +242,16 @@ class Autopilot:
 
     def take_off(self, height_m: float) -> bool:
         """Climb to a height above home, armed and in GUIDED; return whether it does."""
-        if not self.armed or self.mode != "GUIDED" or not self.landed or height_m <= 0:
+        if not self.armed or self.mode != "GUIDED" or not self.landed or not height_m > 0:
             return False
+        self._climb(height_m)
+        return True
+
+    def _climb(self, height_m: float) -> None:
         x, y, _ = self.now.position_m
         self._goal = x, y, self.home_m[2] + height_m
+        self._has_flown = True
         self._control.take_off(height_m)
-        return True
 
     def go_to(
         self,
@@ -230,13 +266,13 @@ class Autopilot:
 
         Without a yaw the nose turns towards a goal that is far, as ``WP_YAW_BEHAVIOR`` says.
         """
-        if self.mode != "GUIDED" or not self._control.flying:
+        if self.mode not in self.guided_modes or not self._control.flying:
             return False
         x, y, z = self.now.position_m
         if place_m is not None:
             self._goal = place_m
             east, north = place_m[0] - x, place_m[1] - y
-            faces = self.parameters["WP_YAW_BEHAVIOR"] in (1, 2)
+            faces = self._faces_goals
             if yaw_rad is None and yaw_rate_radps is None and faces:
                 far = math.hypot(east, north) > FACE_BEYOND_M
                 yaw_rad = math.atan2(north, east) if far else None
@@ -248,9 +284,13 @@ class Autopilot:
         )
         return True
 
+    @property
+    def _faces_goals(self) -> bool:
+        return self.parameters["WP_YAW_BEHAVIOR"] in (1, 2)
+
     def face(self, yaw_rad: float) -> bool:
         """Turn the nose (ENU: counter-clockwise from east) in GUIDED."""
-        if self.mode != "GUIDED" or not self._control.flying:
+        if self.mode not in self.guided_modes or not self._control.flying:
             return False
         self._turn = (0.0, 0.0)
         self._control.guide(yaw=yaw_rad)
@@ -285,10 +325,11 @@ class Autopilot:
             scale = rangefinder_m * rotate(state.attitude, (0.0, 0.0, 1.0))[2] / -up
         x, y, z = state.position_m
         self.target_m = (x + east * scale, y + north * scale, z + up * scale)
+        self.target_s = state.time_s
         self._control.landing_target(self.target_m, state.time_s)
 
-    target_m: Vector | None = None
-    """Where the last measurement of the landing target was."""
+    def target_at(self, place_m: Vector) -> None:
+        """Take a landing target in the local frame (ENU from the origin): ArduPilot takes none."""
 
     def in_world(self, vector: Vector, *, heading: bool = False) -> Vector:
         """Return a vector of north, east, down, or of the vehicle's heading, in the world's frame.
@@ -312,7 +353,7 @@ class Autopilot:
         """Return the motors' thrusts for one control step."""
         if self.state is None and state.position_m[2] > FEET_M + IN_AIR_M:
             self.state = state
-            self.mode, self.armed = "GUIDED", True
+            self.mode, self.armed, self._has_flown = self.air_mode, True, True
             self._control.hover(state, FEET_M)
             self._goal = state.position_m
         self.state = state
@@ -347,14 +388,13 @@ class Autopilot:
         self._goal = self.now.position_m
         self._control.guide(position=self._goal)
 
-    def _begin_return(self) -> None:
+    def _begin_return(self, height_m: float, stay_s: float) -> None:
         if not self._control.flying:
             self._control.land()
             return
         x, y, z = self.now.position_m
-        top = max(z, self.home_m[2] + self.parameters["RTL_ALT"] / 100)
+        top = max(z, self.home_m[2] + height_m)
         legs = [(x, y, top), (self.home_m[0], self.home_m[1], top)]
-        stay_s = self.parameters["RTL_LOIT_TIME"] / 1000
         arrived: list[float] = []
 
         def go_on(state: VehicleState) -> None:
@@ -382,13 +422,14 @@ class Autopilot:
         if self._control.mode == "take-off" and state.position_m[2] < goal[2] - NEAR_M:
             return
         if self._goal != goal:
-            self.go_to(goal)
+            self._goal = goal
+            self._control.guide(position=goal)
         if math.dist(state.position_m, goal) > NEAR_M:
             self._near_s = None
         elif self._near_s is None:
             self._near_s = state.time_s
         elif state.time_s - self._near_s > STILL_S:
-            mode, self._pilot = self._pilot, ""
+            mode, self._pilot = self.pilot_modes[self._pilot], ""
             self.set_mode(mode)
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from pytest_garl.errors import LandingSystemError
-from pytest_garl.vehicle.autopilot import FEET_M, MODES, Autopilot
+from pytest_garl.vehicle.autopilot import FEET_M, HOLDING, Autopilot
 from pytest_garl.vehicle.ned import GROUND_AMSL_M, euler_of, flipped, on_globe, on_map, turned
 from pytest_garl.vehicle.rotations import Vector
 
@@ -127,11 +127,11 @@ class MavlinkLink:
     def _tell_heartbeat(self) -> None:
         d, pilot = self._d, self._autopilot
         mode = d.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | d.MAV_MODE_FLAG_STABILIZE_ENABLED
-        mode |= d.MAV_MODE_FLAG_GUIDED_ENABLED if pilot.mode in ("GUIDED", "RTL", "LAND") else 0
+        mode |= d.MAV_MODE_FLAG_GUIDED_ENABLED if pilot.mode not in HOLDING else 0
         mode |= d.MAV_MODE_FLAG_SAFETY_ARMED if pilot.armed else 0
         status = d.MAV_STATE_STANDBY if pilot.landed else d.MAV_STATE_ACTIVE
         self._mav.heartbeat_send(
-            d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_ARDUPILOTMEGA, mode, MODES[pilot.mode], status
+            d.MAV_TYPE_QUADROTOR, getattr(d, pilot.kind), mode, pilot.mode_number, status
         )
 
     def _tell_sys_status(self) -> None:
@@ -224,15 +224,17 @@ class MavlinkLink:
         if command == d.MAV_CMD_COMPONENT_ARM_DISARM:
             done = pilot.arm() if p[0] == 1 else pilot.disarm(force=p[1] == _FORCE)
         elif command == d.MAV_CMD_NAV_TAKEOFF:
-            done = pilot.take_off(p[6])
+            amsl = pilot.kind == "MAV_AUTOPILOT_PX4"
+            done = pilot.take_off(p[6] - GROUND_AMSL_M if amsl else p[6])
         elif command == d.MAV_CMD_NAV_LAND:
-            done = pilot.set_mode("LAND")
+            precise = pilot.kind == "MAV_AUTOPILOT_PX4" and p[1] >= 1
+            done = pilot.set_mode("AUTO.PRECLAND" if precise else "LAND")
         elif command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             done = pilot.set_mode("RTL")
         elif command == d.MAV_CMD_NAV_LOITER_UNLIM:
             done = pilot.set_mode("LOITER")
         elif command == d.MAV_CMD_DO_SET_MODE:
-            done = self._set_mode(p[1])
+            done = pilot.set_mode(pilot.mode_of(p[1], p[2]))
         elif command == d.MAV_CMD_CONDITION_YAW:
             turn = math.radians(p[0]) * (-1 if p[3] and p[2] < 0 else 1)
             done = pilot.face(pilot.in_world_yaw(turn, relative=bool(p[3])))
@@ -258,10 +260,6 @@ class MavlinkLink:
         if p[1] and int(p[1]) & 1 and not self._autopilot.set_mode("GUIDED"):
             return False
         return self._autopilot.go_to(self._world(p[4], p[5], p[6], frame))
-
-    def _set_mode(self, number: float) -> bool:
-        names = {each: name for name, each in MODES.items()}
-        return self._autopilot.set_mode(names.get(int(number), ""))
 
     def _set_interval(self, message: int, every_s: float) -> bool:
         name = self._name_of(message)
@@ -295,7 +293,7 @@ class MavlinkLink:
         return True
 
     def _on_set_mode(self, m: Any) -> None:
-        done = self._set_mode(m.custom_mode)
+        done = self._autopilot.set_mode(self._autopilot.mode_of(m.custom_mode))
         result = _ACCEPTED[0] if done else _ACCEPTED[1]
         # ArduPilot acknowledges this message by its own number, as if it were a command.
         self._mav.command_ack_send(m.get_msgId(), getattr(self._d, result))
@@ -377,6 +375,9 @@ class MavlinkLink:
         told = (m.x, m.y, m.z) if measured else (m.angle_x, m.angle_y, m.distance)
         self._note_nonsense(m, told)
         if self.nonsense:
+            return
+        if measured and m.frame == self._d.MAV_FRAME_LOCAL_NED:
+            self._autopilot.target_at(self._autopilot.in_world(told))
             return
         direction = told if measured else (-math.tan(told[1]), math.tan(told[0]), 1.0)
         self._autopilot.landing_target(
