@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ from lab.faults.catalogue import FAULTS, PLACEBO, fault_named
 from lab.faults.control import ControlSystem
 from lab.faults.fault import Fault
 from lab.judges.flights import named
-from lab.judges.intervals import Estimate, Values, mean_of, over_clusters
+from lab.judges.intervals import Values, mean_of, over_clusters
 from lab.one_search import Flown, flights_of, flown_by, plan_of
 from lab.table import ResultTable, Row
 from pytest_garl.landing_system import airframe_of
@@ -147,7 +148,7 @@ Found = Mapping[tuple[str, str, str], int]
 def report(rows: Sequence[Row]) -> str:
     """Return the tables in Markdown; seeds that an arm has not flown wholly are left out."""
     all_ = [row for row in rows if row["flights"] == str(FLIGHTS)]
-    short = [row for row in all_ if row["fault"] != PLACEBO.name]
+    short, begun = whole_seeds([row for row in all_ if row["fault"] != PLACEBO.name])
     if not short:
         return "nothing is flown"
     found: Found = {
@@ -160,8 +161,19 @@ def report(rows: Sequence[Row]) -> str:
     if OURS in arms:
         parts += [_ratios(found, lost, [arm for arm in arms if arm != OURS], control)]
     chance = [row for row in all_ if row["fault"] == PLACEBO.name]
-    parts += [_longer(rows), _misses(lost, arms), _placebo(chance), _commits(rows)]
+    parts += [_longer(rows), _misses(lost, arms), _placebo(chance)]
+    if begun:
+        parts.append(f"Not counted, because not all faults are flown: {', '.join(begun)}.")
+    parts.append(f"Flown at {', '.join(sorted({row['commit'] for row in rows}))}.")
     return "\n\n".join(part for part in parts if part)
+
+
+def whole_seeds(rows: Sequence[Row]) -> tuple[list[Row], list[str]]:
+    """Return the rows of seeds of which an arm has flown all faults, and names of the others."""
+    flown = Counter((row["arm"], row["seed"]) for row in rows)
+    begun = {key for key, count in flown.items() if count < max(flown.values())}
+    names = [f"seed {seed} of {arm}" for arm, seed in sorted(begun)]
+    return [row for row in rows if (row["arm"], row["seed"]) not in begun], names
 
 
 def _shares(found: Found, lost: set[Any], arms: Sequence[str], control: int) -> str:
@@ -238,12 +250,6 @@ def paired(
     return tables[0], tables[1], [fault.family for fault in faults]
 
 
-def ratio_to(rows: Sequence[Row], rival: str) -> Estimate:
-    """Return the flights of ours as a multiple of those of a rival."""
-    found = {(r["arm"], r["fault"], r["seed"]): int(r["found_at"] or FLIGHTS) for r in rows}
-    return over_clusters(*paired(found, set(), rival))
-
-
 def _longer(rows: Sequence[Row]) -> str:
     own = [row for row in rows if row["flights"] == str(MORE_FLIGHTS)]
     lines = []
@@ -275,7 +281,3 @@ def _placebo(rows: Sequence[Row]) -> str:
         return ""
     hits = sum(bool(row["found_at"]) for row in rows)
     return f"Twins confirmed a find of the placebo, which has no fault, in {hits} of {len(rows)}."
-
-
-def _commits(rows: Sequence[Row]) -> str:
-    return f"Flown at {', '.join(sorted({row['commit'] for row in rows}))}."
