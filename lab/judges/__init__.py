@@ -31,9 +31,9 @@ each seed: the court for even ones, the lawn for odd ones.
   NPCs, without values, moments, phases, maps, and without the type of violation.  It is *confirmed*
   if two of four twins of the shrunk scenario violate the same property by the same kind of body:
   the start of the UAV is moved by 2 cm to the east, west, north and south.
-- Violations are taken in the order of the flights.  One in which a confirmed cause of the same type
-  of violation acts as a whole is explained and not shrunk.  Of each signature at most
-  ``MOST_ASKED`` are shrunk.
+- Violations are taken in the order of the flights.  One in which a confirmed cause acts as a whole
+  is explained and not shrunk if the two signatures begin with the same two words, such as
+  ``IV:dog``.  Of each signature at most ``MOST_ASKED`` are shrunk.
 - The first generation of each search, the control, counts for nobody, nor does a violation whose
   landing system raised.  No probe is flown.
 - Arms: ``exploring+``, ``garl``, ``shuffled`` on seeds 20 to 24, ``exploring`` on 20 and 21.
