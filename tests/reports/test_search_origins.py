@@ -186,6 +186,6 @@ def test_the_summary_says_how_good_the_director_was_in_all_generations() -> None
     assert director_text(told) == (
         "what begins of 4 NPCs were worth, where 1 is a collision that the system could have "
         "prevented: 0.25 as the director decides that learns from earlier flights, 0.10 with the "
-        "weights that ship, 0.05 by the fixed rule, 0.50 at best; of 3 NPCs that were seen coming "
-        "it expected 1.5 to meet the UAV, and 2 did"
+        "weights that ship, 0.05 by the fixed rule, 0.50 at best; of 3 seen coming it expected "
+        "1.5 to meet the UAV, and 2 did"
     )
