@@ -206,8 +206,8 @@ def director_text(search: SearchRecord) -> str:
     if director is None:
         return ""
     seen = (
-        f"; of {director.seen} seen coming it expected {director.expected:.1f} to meet the UAV, and "
-        f"{director.met} did"
+        f"; of {director.seen} seen coming it expected {director.expected:.1f} to meet the UAV, "
+        f"and {director.met} did"
     )
     return (
         f"what begins of {director.npcs} NPCs were worth, where 1 is a collision that the system "
