@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.companion.processes import running
+from tests.companion.processes import gradient, running
 
 
 def test_clocks_tell_the_flights_time_and_sleep_waits_for_it(tmp_path: Path) -> None:
@@ -166,6 +166,47 @@ def test_another_program_runs_at_one_moment_of_the_flight(tmp_path: Path) -> Non
     """
     with running(tmp_path, text) as simulator:
         assert simulator.fly(0.3).printed == "out\nb'in' 0 True\n"
+
+
+def test_a_python_program_that_it_starts_runs_in_the_same_time(tmp_path: Path) -> None:
+    (tmp_path / "child.py").write_text(
+        "import sys, time, cv2\n"
+        "from socket import socket, AF_INET, SOCK_DGRAM\n"
+        "print('child', sys.argv[1], '%.2f' % time.monotonic())\n"
+        "image = cv2.VideoCapture(0).read()[1]\n"
+        "time.sleep(0.3)\n"
+        "socket(AF_INET, SOCK_DGRAM).sendto(b'hello', ('127.0.0.1', 14550))\n"
+        "print('saw', image[5, 0, 0], '%.2f' % time.monotonic())\n"
+        "sys.exit(3)\n"
+    )
+    text = """
+        import subprocess, sys, time
+        time.sleep(0.1)
+        command = [sys.executable, "-u", "child.py", "a"]
+        child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        print(child.poll(), child.stdout.readline().strip())
+        for line in child.stdout:
+            print(line.strip(), "%.1f" % time.monotonic())
+        print(child.wait(), child.poll())
+        endless = subprocess.Popen("python child.py b", shell=True)
+        try:
+            endless.wait(0.1)
+        except subprocess.TimeoutExpired:
+            endless.kill()
+        print(endless.wait())
+    """
+    with running(tmp_path, text) as simulator:
+        simulator.picture = gradient
+        simulator.fly(1.0, frames=True)
+        assert simulator.failure == ""
+        assert simulator.printed.splitlines() == [
+            "None child a 0.10",
+            "saw 5 0.40 0.4",
+            "3 3",
+            "child b 0.42",
+            "-9",
+        ]
+        assert simulator.sent == b"hello"
 
 
 def test_threads_that_are_no_daemons_run_on_and_functions_at_exit_are_called(

@@ -17,6 +17,8 @@ Simulated time, in steps:
 4. Sockets are queues in this process (``network.py``).  What is sent to a port on which the program
    does not listen itself goes to the vehicle.
 5. ``cv2.VideoCapture`` asks the simulator for a frame when the program reads it (``sight.py``).
+6. A Python program that it starts by ``subprocess`` runs under the same files, and gets its time
+   from a task of this process (``offspring.py``).
 
 As an example: a thread reads MAVLink by ``select`` with a time-out of 50 ms, the main thread waits
 for a frame.  At 0.00 s both park.  The simulator flies 20 ms and sends a heartbeat: the reader is

@@ -38,10 +38,14 @@ class Network:
         self.bound: dict[tuple[int, Any], Socket] = {}
         self.to_vehicle: list[Socket] = []
         """The ends of links to the vehicle, in the order in which they were opened."""
+        self.mailboxes: list[bytearray] = []
+        """Of other processes that the program has started."""
         self._port = 40_000
 
     def deliver(self, data: bytes) -> None:
         """Give bytes of the vehicle to all its links."""
+        for box in self.mailboxes:
+            box += data
         if data:
             for each in list(self.to_vehicle):
                 each.take(data, VEHICLE)

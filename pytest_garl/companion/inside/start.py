@@ -41,7 +41,7 @@ def load_inside() -> Any:
     package = importlib.util.module_from_spec(spec)
     sys.modules[NAME] = package
     spec.loader.exec_module(package)
-    for each in ("turns", "network", "sight"):
+    for each in ("offspring", "turns", "network", "sight"):
         importlib.import_module(f"{NAME}.{each}")
     return package
 
@@ -88,7 +88,7 @@ class Host:
     """The simulator's end: asks it for more time, and for frames."""
 
     def __init__(self, link: socket.socket, settings: dict[str, Any]) -> None:
-        self._link, self._settings = link, settings
+        self._link, self.settings = link, settings
         self._receive, self._send = link.recv_into, link.sendall
         self.turns = sys.modules[f"{NAME}.turns"].Turns(self.exchange)
         self.network = sys.modules[f"{NAME}.network"].Network(self.turns)
@@ -140,7 +140,7 @@ class Host:
 
         self._write(b"F", b"")
         _, data = self._read()
-        shape = self._settings["height_px"], self._settings["width_px"], 3
+        shape = self.settings["height_px"], self.settings["width_px"], 3
         return np.frombuffer(data, np.uint8).reshape(shape)
 
     def _write(self, kind: bytes, data: bytes) -> None:
@@ -193,6 +193,7 @@ def install(host: Host) -> None:
     turns, network, sight = (sys.modules[f"{NAME}.{each}"] for each in parts)
     turns.install(host.turns)
     network.install(host.network)
+    sys.modules[f"{NAME}.offspring"].install(host, HEADER)
     tags = {
         name: lambda module: sight.change_apriltag(module, host.sight)
         for name in ("pupil_apriltags", "dt_apriltags", "pyapriltags")
@@ -278,6 +279,7 @@ def main() -> None:
     failure: dict[str, Any] | None = None
     try:
         host.get_time()
+        host.turns.now_s = host.turns.until_s
         run(settings["arguments"])
         _finish()
     except SystemExit as end:
