@@ -182,6 +182,16 @@ class CompanionFlight:
                 kind="died",
             )
 
+        idle = not self._link.heard and self._autopilot.landed and not self._vehicle.pilot
+        if now_s > LINK_BY_S and idle and answer.status is None:
+            raise self._failure(
+                "NoMessage",
+                f"has sent the vehicle nothing after {LINK_BY_S:g} s, and it stands on the ground; "
+                "expected GUIDED, arming and a take-off. If your program waits for a pilot, give "
+                "ArduCopter(pilot='LAND'), or start='hover' in the marker",
+                kind="died",
+            )
+
     def _picture(self) -> bytes:
         assert self._observation is not None
         return cv2.cvtColor(self._observation.image, cv2.COLOR_RGB2BGR).tobytes()

@@ -198,6 +198,13 @@ def test_a_program_that_opens_no_link_is_told_so(tmp_path: Path) -> None:
         fly_still(program(tmp_path, WAITS), 31.0)
 
 
+def test_a_program_that_says_nothing_to_a_vehicle_on_the_ground_is_told_so(tmp_path: Path) -> None:
+    with pytest.raises(ProgramFailedError, match="has sent the vehicle nothing after 30 s, and it"):
+        fly_still(program(tmp_path, f"{HEADER}\ntime.sleep(99)\n"), 31.0)
+    waits = ArduCopter(pilot="LOITER")
+    fly_still(program(tmp_path, f"{HEADER}\ntime.sleep(99)\n", vehicle=waits), 30.5)
+
+
 def test_nothing_of_a_program_is_left_after_its_flight(tmp_path: Path) -> None:
     text = """
         import os, subprocess, time
