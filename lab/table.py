@@ -96,15 +96,6 @@ def run_study(
         fly(arguments)
 
 
-def definitions(rows: Iterable[Row]) -> str:
-    """Return the limits by which rows count violations; "old" for rows that do not name them.
-
-    Rows of version 0.1 count a collision, a landing more than 1.5 m from the marker, or no landing
-    within two minutes; a flight that gives up is none.
-    """
-    return " / ".join(sorted({row["limits"] or "old" for row in rows}))
-
-
 def share(count: int, total: int) -> str:
     """Return a percentage with its exact 95 % interval."""
     low, high = share_interval(count, total)

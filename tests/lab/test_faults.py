@@ -10,7 +10,9 @@ import pytest
 from lab.arms import DOMAIN
 from lab.faults.catalogue import FAULTS, fault_named
 from lab.faults.control import ControlSystem
-from lab.faults.fault import SCENARIOS, Fault, finds, result_of
+from lab.faults.fault import SCENARIOS, Fault
+from lab.judges.faults import violates
+from lab.one_search import flown_by
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.domains.genome import genome_of
@@ -68,9 +70,9 @@ def test_a_scenario_lies_inside_field_and_its_genome_expresses_it(name: str) -> 
 )
 def test_a_scenario_fires_its_fault_and_no_fault_of_the_control(name: str) -> None:
     fault = fault_named(name)
-    faulty = result_of(fault.faulty, fault.scenario, NPCS)
+    faulty = flown_by(fault.faulty, NPCS, fault.scenario).result
     assert faulty.verdict.violation_type == fault.fires, faulty.verdict.story
-    assert finds(fault, fault.scenario, NPCS, faulty)
+    assert not violates(fault.control, NPCS, fault.scenario)
 
 
 @pytest.mark.sim
@@ -78,14 +80,14 @@ def test_a_scenario_fires_its_fault_and_no_fault_of_the_control(name: str) -> No
 @pytest.mark.parametrize("name", NAMES)
 def test_a_faulty_system_lands_in_the_nominal_scenario(name: str) -> None:
     fault = fault_named(name)
-    verdict = result_of(fault.faulty, nominal(fault.map), NPCS).verdict
+    verdict = flown_by(fault.faulty, NPCS, nominal(fault.map)).result.verdict
     assert verdict.completed, verdict.story
 
 
 @pytest.mark.sim
 @pytest.mark.parametrize("map_name", ["court", "lawn"])
 def test_the_control_lands_in_the_nominal_scenario(map_name: str) -> None:
-    assert result_of(ControlSystem, nominal(map_name), NPCS).verdict.completed
+    assert flown_by(ControlSystem, NPCS, nominal(map_name)).result.verdict.completed
 
 
 def test_the_page_lists_every_fault_with_its_links() -> None:

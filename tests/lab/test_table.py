@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from lab.table import Key, ResultTable, definitions, run_study
+from lab.table import Key, ResultTable, run_study
 
 
 def squared(key: Key, pool: Executor) -> dict[str, Any]:
@@ -51,8 +51,3 @@ def test_columns_that_an_older_file_lacks_are_empty_and_added_with_the_next_row(
     assert table.rows() == [{"number": "2", "square": ""}]
     table.append([{"number": 3, "square": 9}])
     assert table.file.read_text().splitlines() == ["number,square", "2,", "3,9"]
-
-
-def test_rows_without_limits_are_of_the_old_definition() -> None:
-    assert definitions([{"limits": ""}]) == "old"
-    assert definitions([{"limits": "0.75 m"}, {"limits": ""}]) == "0.75 m / old"
