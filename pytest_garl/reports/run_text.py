@@ -34,6 +34,9 @@ LEGEND = {
 
 _MADE: Mapping[How, str] = {"control": "random", "stratified": "stratified", "bred": "bred"}
 
+TELLING_NPCS = 10
+"""Means of fewer NPCs are chance."""
+
 
 def run_text(run: RunRecord) -> str:
     """Return a run in short, for ``garl report``."""
@@ -201,9 +204,12 @@ def movers_text(search: SearchRecord) -> str:
 
 
 def director_text(search: SearchRecord) -> str:
-    """Return how good the director was that learned this landing system; empty without one."""
+    """Return how good the director was that learned this landing system; empty without one.
+
+    Fewer than :data:`TELLING_NPCS` NPCs say nothing.
+    """
     director = search.director
-    if director is None:
+    if director is None or director.npcs < TELLING_NPCS:
         return ""
     seen = (
         f"; of {director.seen} seen coming it expected {director.expected:.1f} to meet the UAV, "

@@ -175,16 +175,17 @@ def test_the_summary_says_how_good_the_director_was_in_all_generations() -> None
             expected=seen / 2,
             met=1,
         )
-        for npcs, learned, seen in ((1, 0.1, 1), (3, 0.3, 2))
+        for npcs, learned, seen in ((5, 0.1, 1), (15, 0.3, 2))
     )
     assert total([quiet]) is None
     assert total([quiet, first]) == first
     key = SearchKey(system="m:S", map="lawn")
     search = SearchRecord(key=key, name=key.place, flights=(), kinds=(), violating=0)
     assert director_text(search) == ""
+    assert director_text(dataclasses.replace(search, director=first)) == "", "too few to say"
     told = dataclasses.replace(search, director=total([first, quiet, second]))
     assert director_text(told) == (
-        "what begins of 4 NPCs were worth, where 1 is a collision that the system could have "
+        "what begins of 20 NPCs were worth, where 1 is a collision that the system could have "
         "prevented: 0.25 as the director decides that learns from earlier flights, 0.10 with the "
         "weights that ship, 0.05 by the fixed rule, 0.50 at best; of 3 seen coming it expected "
         "1.5 to meet the UAV, and 2 did"
