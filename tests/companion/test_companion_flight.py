@@ -104,6 +104,24 @@ print(link.recv_match(type="DISTANCE_SENSOR", blocking=True).current_distance)
     assert "\n20" in said
 
 
+@pytest.mark.parametrize(
+    "connection",
+    ["udpin:0.0.0.0:14551", "udpout:10.0.0.2:14550", "tcp:127.0.0.1:5762", "/dev/ttyACM0"],
+)
+def test_real_mavutil_connects_by_udp_tcp_and_a_serial_port(
+    tmp_path: Path, connection: str
+) -> None:
+    text = f"""
+from pymavlink import mavutil
+link = mavutil.mavlink_connection({connection!r}, baud=57600)
+link.mav.heartbeat_send(18, 8, 0, 0, 0)
+link.wait_heartbeat()
+link.set_mode("GUIDED")
+print(link.target_system, link.recv_match(type="COMMAND_ACK", blocking=True).result)
+"""
+    assert "1 0" in notes(fly_still(program(tmp_path, text), 2.0))
+
+
 def test_a_landing_target_and_a_marker_in_its_detector_are_diagnostics(tmp_path: Path) -> None:
     text = f"""{HEADER}
 import cv2
