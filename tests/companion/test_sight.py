@@ -70,6 +70,25 @@ def test_markers_that_its_detector_returns_are_told_in_pixels_of_the_camera(
     assert corners[2] == pytest.approx((24, 20), abs=0.3)
 
 
+def test_detectors_that_are_made_for_each_picture_leave_pythons_memory_whole(
+    tmp_path: Path,
+) -> None:
+    text = """
+        import cv2
+        import numpy as np
+        image = np.zeros((48, 64), np.uint8)
+        dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+        kept = []
+        for number in range(300):
+            cv2.aruco.detectMarkers(image, dictionary)
+            cv2.aruco.ArucoDetector(dictionary)
+            kept.append({"number": number, "texts": [str(each) for each in range(50)]})
+        print(sum(len(each["texts"]) for each in kept))
+    """
+    with running(tmp_path, text) as simulator:
+        assert simulator.fly(0.1).printed == "15000\n"
+
+
 def test_a_window_is_refused_or_ignored(tmp_path: Path) -> None:
     text = """
         import cv2, time

@@ -140,11 +140,21 @@ def _change_aruco(cv2: Any, aruco: Any, sight: Sight) -> None:
     real: Any = getattr(aruco, "ArucoDetector", None)
     if real is not None:
 
-        class ArucoDetector(real):  # type: ignore[misc]
-            """OpenCV's detector; what it returns is told."""
+        class ArucoDetector:
+            """OpenCV's detector; what it returns is told.
+
+            Not derived from it: OpenCV frees an object of a derived class as one of its own, and
+            so damages Python's memory.
+            """
+
+            def __init__(self, *arguments: Any, **options: Any) -> None:
+                self._real = real(*arguments, **options)
+
+            def __getattr__(self, name: str) -> Any:
+                return getattr(self._real, name)
 
             def detectMarkers(self, image: Any, *more: Any, **options: Any) -> Any:
-                result = super().detectMarkers(image, *more, **options)
+                result = self._real.detectMarkers(image, *more, **options)
                 sight.tell(result[1], result[0], image)
                 return result
 
