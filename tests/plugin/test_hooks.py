@@ -52,6 +52,7 @@ def test_the_same_seed_gives_the_same_results_for_any_workers(
 def test_a_network_that_learns_in_pytest_finds_the_same_for_any_workers(
     pytester: pytest.Pytester,
 ) -> None:
+    pytest.importorskip("torch")
     project(pytester)
     hashes = set()
     for args in (("--garl-workers=0",), ("--garl-workers=2", "-n2")):

@@ -79,6 +79,8 @@ def test_an_unknown_ini_key_is_one_usage_error_that_names_the_nearest(
 def test_the_method_chooses_the_npc_policy_unless_an_option_does(
     pytester: pytest.Pytester, args: tuple[str, ...], words: str
 ) -> None:
+    if "--garl-method=offline-rl" in args:
+        pytest.importorskip("torch")
     project(pytester)
     result = run(pytester, "--garl-budget=1", "--garl-workers=0", *args)
     result.stdout.fnmatch_lines([words])

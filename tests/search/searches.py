@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import importlib.util
+
+import pytest
+
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.method import FlownScenario, Method, SearchPlan
+from pytest_garl.search.method_catalogue import declaration_of, method_names
 from pytest_garl.verdicts.verdict import Margin
 from tests.support.results import flight_result
 
@@ -41,3 +46,17 @@ def bred(method: Method, generations: int) -> list[list[Scenario]]:
         made.append(list(method.ask()))
         method.tell([FlownScenario(scenario=each, result=result(each)) for each in made[-1]])
     return made
+
+
+def every_method(*without: str) -> list[object]:
+    """Return the shipped methods as parameters; one that needs PyTorch is skipped without it."""
+    has_torch = importlib.util.find_spec("torch") is not None
+    return [
+        pytest.param(
+            name,
+            marks=pytest.mark.skipif(
+                bool(declaration_of(name).extra) and not has_torch, reason="needs PyTorch"
+            ),
+        )
+        for name in sorted({*method_names()} - {*without})
+    ]

@@ -17,10 +17,10 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.breeder import Breeder
 from pytest_garl.search.method import FlownScenario, SearchPlan
-from pytest_garl.search.method_catalogue import make_method, method_names
+from pytest_garl.search.method_catalogue import make_method
 from pytest_garl.search.teaching import Lessons
 from tests.execution.flying import Good, job_of
-from tests.search.searches import result
+from tests.search.searches import every_method, result
 
 MAP = load_map("court")
 GENOME = genome_for(MAP)
@@ -53,7 +53,7 @@ def searched(path: Path, name: str, budget: int, wanted: tuple[Slot, ...] = ()) 
         pytest.param(range(1, 61), id="all", marks=pytest.mark.long),
     ],
 )
-@pytest.mark.parametrize("name", sorted({*method_names()} - {"surrogate-random", "online-rl"}))
+@pytest.mark.parametrize("name", every_method("surrogate-random", "online-rl"))
 def test_every_budget_is_flown_exactly(tmp_path: Path, name: str, budgets: Sequence[int]) -> None:
     for budget in budgets:
         ledger = searched(tmp_path / f"{budget}.sqlite", name, budget)
