@@ -378,11 +378,16 @@ class CompanionProcess:
         self._wait.select(QUIET_S)
         time.sleep(STACK_S)
         self._read_output()
+        place = self._place()
+        at = f", at {place}" if place else ""
+        sys.stderr.write(f"{self._name} computes without waiting for anything{at}\n")
+
+    def _place(self) -> str:
+        """Return where the program was, of the last stack of threads in what it wrote."""
         stack = self._said.decode(errors="replace").rpartition("Current thread")[2]
         places = [line.strip() for line in stack.splitlines() if line.startswith("  File")]
         own = [each for each in places if str(RUNNER.parent) not in each]
-        at = f", at {own[0]}" if own else ""
-        sys.stderr.write(f"{self._name} computes without waiting for anything{at}\n")
+        return own[0] if own else ""
 
     def _read_output(self) -> None:
         """Take what was written past Python's ``sys.stdout``: it may not block the process."""
@@ -403,6 +408,8 @@ class CompanionProcess:
         name = f" ({signal.Signals(-status).name})" if -status in {*signal.Signals} else ""
         said = self._said.decode(errors="replace").strip()
         end = f"; it said last: {said[-300:]}" if said else ""
+        if place := self._place():
+            end = f", at {place}"
         return self._failure(
             how.replace(" ", "-"), f"ended in the flight with {how}{name}{end}", trace=said
         )

@@ -152,7 +152,7 @@ FAILURES: dict[str, tuple[str, str, str]] = {
     "exits late": ("import time, os\ntime.sleep(0.5)\nos._exit(0)", "exit-status-0", "ended in t"),
     "kills itself": ("import os; os.kill(os.getpid(), 9)", "signal-9", "signal 9 (SIGKILL)"),
     "kills its group": ("import os; os.killpg(0, 9)", "signal-9", "SIGKILL"),
-    "segfaults": ("import ctypes; ctypes.string_at(0)", "signal-11", "SIGSEGV"),
+    "segfaults": ("import ctypes; ctypes.string_at(0)", "signal-11", "SIGSEGV), at File"),
     "raises": ("x = {}\nx['id']", "KeyError", "'id' (lander.py, line 2)"),
     "raises a text of 9 MB": ("raise ValueError('x' * 9_000_000)", "ValueError", "xxx"),
     "does not parse": ("def f(:", "SyntaxError", "lander.py"),
