@@ -204,7 +204,8 @@ class Corpus:
         return self._listed[folder]
 
     def _list(self, folder: Path) -> Iterator[CorpusEntry]:
-        for path in sorted(folder.glob("[!.]*.toml")):
+        # Of a folder that no system can name, such as one with a NUL, glob raises since Python 3.13.
+        for path in sorted(folder.glob("[!.]*.toml")) if folder.is_dir() else ():
             try:
                 changed_ns = path.stat().st_mtime_ns
             except OSError as error:
