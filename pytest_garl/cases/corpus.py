@@ -204,7 +204,7 @@ class Corpus:
         return self._listed[folder]
 
     def _list(self, folder: Path) -> Iterator[CorpusEntry]:
-        # Of a folder that no system can name, such as one with a NUL, glob raises since Python 3.13.
+        # Since Python 3.13 glob raises for a name that no folder can have, such as one with a NUL.
         for path in sorted(folder.glob("[!.]*.toml")) if folder.is_dir() else ():
             try:
                 changed_ns = path.stat().st_mtime_ns
