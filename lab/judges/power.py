@@ -1,8 +1,9 @@
 """Which differences the judges can see: from old seeds, and from the stand-in.
 
 Nothing here is of a seed that judges anything.  Judge 1 from docs/faults.csv (seeds 1 to 5 of an
-older search), judge 2 from docs/kinds.csv (older, seeds 1000 to 1009) and docs/ablations.csv (the
-stand-in), judge 3 from the rate of collisions of one chasing NPC in docs/grades.csv.
+older search), judge 2 from docs/kinds.csv (older, seeds 1000 to 1009) and docs/judge-stand-in.csv
+(the same searches for causes, of the stand-in, seeds 204 to 211), judge 3 from the collisions of
+one chasing NPC in docs/grades.csv.
 """
 
 from __future__ import annotations
@@ -55,12 +56,14 @@ def of_faults(rows: Sequence[Row]) -> str:
     )
 
 
-def of_causes(pairs: int, title: str, differences: Sequence[float], mean: float) -> str:
-    """Return what judge 2 can see, from paired differences of kinds of violation."""
+def of_causes(
+    pairs: int, counted: str, title: str, differences: Sequence[float], mean: float
+) -> str:
+    """Return what judge 2 can see, from paired differences of what a search found."""
     deviation = float(np.std(differences, ddof=1))
     seen = seen_difference(deviation, pairs)
     return (
-        f"Judge 2, {title}: paired differences of kinds have a standard deviation of "
+        f"Judge 2, {title}: paired differences of {counted} have a standard deviation of "
         f"{deviation:.1f} ({len(differences)} pairs); {pairs} pairs see a difference of "
         f"{seen:.1f}, {100 * seen / mean:.0f} % of the mean of {mean:.1f}, in {100 * POWER:.0f} % "
         "of studies."
@@ -76,7 +79,7 @@ def of_kinds(rows: Sequence[Row]) -> str:
     differences = [counts["garl", *key] - counts["random", *key] for key in keys]
     mean = float(np.mean([counts["garl", *key] for key in keys]))
     title = "old seeds, garl less random"
-    return of_causes(len(causes.SEEDS) * len(SYSTEMS), title, differences, mean)
+    return of_causes(len(causes.SEEDS) * len(SYSTEMS), "kinds", title, differences, mean)
 
 
 def _later_kinds(kinds: str, control: int = 20) -> float:
@@ -84,18 +87,13 @@ def _later_kinds(kinds: str, control: int = 20) -> float:
 
 
 def of_stand_in(rows: Sequence[Row], rival: str) -> str:
-    """Return it from the stand-in, against the rival without children."""
-    counts = {
-        (row["variant"], row["landing"], row["seed"], row["map"]): float(
-            len(json.loads(row["kinds"]))
-        )
-        for row in rows
-    }
+    """Return it from the same searches for causes of the stand-in."""
+    counts = {(row["arm"], row["system"], row["seed"]): float(row["count"]) for row in rows}
     keys = [key[1:] for key in counts if key[0] == rival]
-    differences = [counts["garl", *key] - counts[rival, *key] for key in keys]
-    mean = float(np.mean([counts["garl", *key] for key in keys]))
+    differences = [counts[causes.OURS, *key] - counts[rival, *key] for key in keys]
+    mean = float(np.mean([counts[causes.OURS, *key] for key in keys]))
     title = f"stand-in, garl less {rival}"
-    return of_causes(len(causes.SEEDS) * len(SYSTEMS), title, differences, mean)
+    return of_causes(len(causes.SEEDS) * len(SYSTEMS), "causes", title, differences, mean)
 
 
 def of_preventable(rows: Sequence[Row]) -> str:
@@ -133,8 +131,8 @@ def power_of_ratio(rate: float, times: float, count: int) -> float:
 def report() -> str:
     """Return what the judges can see."""
     docs = Path("docs")
-    stand_in = read_csv(docs / "ablations.csv")
-    rivals = [name for name in dict.fromkeys(r["variant"] for r in stand_in) if "expl" in name]
+    stand_in = read_csv(docs / "judge-stand-in.csv")
+    rivals = [arm for arm in dict.fromkeys(row["arm"] for row in stand_in) if arm != causes.OURS]
     return "\n".join(
         (
             of_faults(read_csv(docs / "faults.csv")),

@@ -459,6 +459,16 @@ def test_more_pairs_see_a_smaller_difference() -> None:
     assert power.power_of_ratio(0.05, 3.0, 400) > power.power_of_ratio(0.05, 1.2, 400)
 
 
+def test_the_power_of_causes_is_that_of_paired_differences() -> None:
+    keys = [(str(seed), landing) for seed in range(204, 208) for landing in ("ordinary", "sturdy")]
+    rows = cause_rows("garl", dict.fromkeys(keys, 12))
+    rows += cause_rows("exploring+", {key: 9 + 2 * (int(key[0]) % 2) for key in keys})
+    text = power.of_stand_in(rows, "exploring+")
+    # Half of the differences are 3, half are 1.
+    assert "paired differences of causes have a standard deviation of 1.1 (8 pairs)" in text
+    assert "15 pairs see a difference of 0.8, 7 % of the mean of 12.0" in text
+
+
 def test_a_margin_is_worth_the_begins_that_meet_in_view() -> None:
     states = np.zeros((6, len(FEATURES)))
     states[:, AT["sees"]], states[:, AT["climb"]] = 1.0, -0.5
