@@ -173,8 +173,7 @@ def check_system(system: Any) -> None:
         )
     if not inspect.isclass(system):
         raise LandingSystemError(
-            f"system={system!r}: expected a class or a program such as CompanionProgram(...), "
-            f"found {type(system).__name__}"
+            f"system={system!r}: expected a class or a program, found {type(system).__name__}"
         )
     for method in ("reset", "step"):
         if not callable(getattr(system, method, None)):

@@ -96,7 +96,7 @@ def test_diff_refuses_a_system_that_one_checkout_lacks(checkouts: Path) -> None:
     ("words", "expected"),
     [
         (("--system=stack.system:Other",), "AttributeError: "),
-        (("--system=stack.helper:decide",), "expected a class, found function"),
+        (("--system=stack.helper:decide",), "expected a class or a program, found function"),
         (("--system=stack",), "found 'stack'"),
         ((), "found neither --system nor --from-ledger"),
         (("--system=stack.system:Lander", "--maps=moon"), "unknown map 'moon'"),

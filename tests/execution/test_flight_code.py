@@ -92,6 +92,7 @@ def test_no_module_of_the_search_or_of_pytest_flies() -> None:
             "foreign_text",
             "landing_system",
             "npcs",
+            "program",
             "scenarios",
             "simulation",
             "verdicts",
