@@ -60,7 +60,7 @@ def test_stand_in_for_macos_lacks_what_macos_lacks(tmp_path: Path) -> None:
     assert run("macos", tmp_path, "-c", code) == (0, "")
 
 
-@pytest.mark.parametrize("lander", ["Good", "Exits"])
+@pytest.mark.parametrize("lander", ["Good", pytest.param("Exits", marks=pytest.mark.long)])
 def test_search_on_macos_finds_what_it_finds_on_linux(lander: str, tmp_path: Path) -> None:
     results = set()
     for system in ("linux", "macos"):
