@@ -10,7 +10,7 @@ import numpy as np
 
 from pytest_garl.errors import PolicyError
 from pytest_garl.messages import shown
-from pytest_garl.npcs.director import Director, TimeToGo, Watch
+from pytest_garl.npcs.director import Director, LearnedDirector, TimeToGo, Watch
 from pytest_garl.npcs.interference import Interfering
 from pytest_garl.npcs.minds import Intercepting
 from pytest_garl.scenarios.story import story_of, waits_for_decision
@@ -64,7 +64,6 @@ def director_of(text: str) -> Director:
     Empty: the weights that ship.  ``time-to-go 0.5 1``: that rule, with its margin and its time
     after an unseen UAV passed 3 m.  Else the weights of a network, as ``Network.text`` gives them.
     """
-    from pytest_garl.npcs.director import LearnedDirector
     from pytest_garl.npcs.learned import learned_director, network_from
 
     if not text:
