@@ -1,4 +1,4 @@
-"""Learning in NumPy: the gradient of a Q-network, Adam, and double Q-learning from kept decisions.
+"""Learning in NumPy: the gradient of a Q-network, Adam, and learning when to go.
 
 It runs where nobody has installed torch: on the machine of whoever searches.  One thread, double
 precision and a seed of its own: the same rows give the same bytes on every CPU, within what
@@ -38,18 +38,6 @@ class Decisions:
     goes_on: Array
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class QLearning:
-    """The settings of double Q-learning (van Hasselt et al. 2016) from kept decisions."""
-
-    seed: int = 0
-    updates: int = 4000
-    batch: int = 64
-    learning_rate: float = 1e-3
-    target_every: int = 200
-    """Updates after which the target network becomes a copy of the network."""
-
-
 def untrained(state: str, sizes: Sequence[int], seed: int) -> Network:
     """Return a network with random weights, as torch draws them: ±1/√inputs.
 
@@ -65,11 +53,6 @@ def untrained(state: str, sizes: Sequence[int], seed: int) -> Network:
     return Network(state=state, layers=tuple(layers))
 
 
-def values_of(layers: Layers, states: Array) -> Array:
-    """Return the values of each action for many states, (n, actions)."""
-    return _signals(layers, states)[-1]
-
-
 def _signals(layers: Layers, states: Array) -> list[Array]:
     """Return the input of each layer, and the last one's output."""
     signals = [states]
@@ -77,22 +60,6 @@ def _signals(layers: Layers, states: Array) -> list[Array]:
         signals.append(np.maximum(signals[-1] @ weight.T + bias, 0.0))
     weight, bias = layers[-1]
     return [*signals, signals[-1] @ weight.T + bias]
-
-
-def loss_and_gradient(
-    layers: Layers, states: Array, actions: Numbers, expected: Array
-) -> tuple[float, Layers]:
-    """Return the mean Huber loss of the chosen actions' values, and its gradient.
-
-    The loss of a difference d is d²/2 up to 1 and |d| - 1/2 beyond.
-    """
-    signals, rows = _signals(layers, states), np.arange(len(states))
-    difference = signals[-1][rows, actions] - expected
-    size = np.abs(difference)
-    loss = np.where(size < 1, difference**2 / 2, size - 0.5).mean()
-    slope = np.zeros_like(signals[-1])
-    slope[rows, actions] = np.clip(difference, -1.0, 1.0) / len(states)
-    return float(loss), _backwards(layers, signals, slope)
 
 
 def _backwards(layers: Layers, signals: Sequence[Array], slope: Array) -> Layers:
@@ -127,26 +94,6 @@ class Adam:
             size = np.sqrt(self._squares[index] / second) + 1e-8
             parts.append(part - self._rate * (self._means[index] / first) / size)
         return tuple(zip(parts[::2], parts[1::2], strict=True))
-
-
-def learned_from(network: Network, decisions: Decisions, settings: QLearning) -> Network:
-    """Return the network after double Q-learning from decisions."""
-    rng = np.random.default_rng(settings.seed)
-    layers = target = network.layers
-    adam = Adam(layers, settings.learning_rate)
-    for number in range(settings.updates):
-        if number % settings.target_every == 0:
-            target = layers
-        chosen = rng.integers(len(decisions.actions), size=settings.batch)
-        afters = decisions.afters[chosen]
-        best = values_of(layers, afters).argmax(axis=1)
-        follows = values_of(target, afters)[np.arange(len(best)), best]
-        expected = decisions.rewards[chosen] + decisions.goes_on[chosen] * follows
-        _, gradient = loss_and_gradient(
-            layers, decisions.states[chosen], decisions.actions[chosen], expected
-        )
-        layers = adam.step(layers, gradient)
-    return Network(state=network.state, layers=layers)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

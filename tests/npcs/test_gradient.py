@@ -9,17 +9,17 @@ import pytest
 
 from pytest_garl.npcs.gradient import (
     Adam,
-    Decisions,
-    QLearning,
+    Layers,
+    Numbers,
     Stopping,
     StoppingRate,
+    _backwards,
+    _signals,
     _StoppingTable,
-    learned_from,
     learned_when_to_go,
-    loss_and_gradient,
     untrained,
-    values_of,
 )
+from pytest_garl.npcs.learned import Array
 
 SIZES = (6, 24, 24, 2)
 
@@ -32,6 +32,27 @@ def batch(count: int = 64) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         rng.integers(SIZES[-1], size=count),
         rng.normal(scale=2.0, size=count),
     )
+
+
+def values_of(layers: Layers, states: Array) -> Array:
+    """Return the values of each action for many states, (n, actions)."""
+    return _signals(layers, states)[-1]
+
+
+def loss_and_gradient(
+    layers: Layers, states: Array, actions: Numbers, expected: Array
+) -> tuple[float, Layers]:
+    """Return the mean Huber loss of the chosen actions' values, and its gradient.
+
+    The loss of a difference d is d²/2 up to 1 and |d| - 1/2 beyond.
+    """
+    signals, rows = _signals(layers, states), np.arange(len(states))
+    difference = signals[-1][rows, actions] - expected
+    size = np.abs(difference)
+    loss = np.where(size < 1, difference**2 / 2, size - 0.5).mean()
+    slope = np.zeros_like(signals[-1])
+    slope[rows, actions] = np.clip(difference, -1.0, 1.0) / len(states)
+    return float(loss), _backwards(layers, signals, slope)
 
 
 def test_the_gradient_is_that_of_small_differences() -> None:
@@ -72,49 +93,6 @@ def test_gradient_and_step_are_those_of_torch() -> None:
         layers = adam.step(layers, gradient)
     for own, part in zip((each for layer in layers for each in layer), parts, strict=True):
         assert np.abs(own - part.detach().numpy()).max() < 1e-10
-
-
-def stopping() -> Decisions:
-    """Return decisions of a task in which to go pays if the first number is above 1/2.
-
-    It rises from 0 to 1 in ten steps; to go too early is worth nothing.
-    """
-    states, afters, actions, rewards, goes_on = [], [], [], [], []
-    for step in range(10):
-        state, after = (np.array([each / 10, 1.0]) for each in (step, step + 1))
-        states += [state, state]
-        afters += [after, state]
-        actions += [0, 1]
-        rewards += [0.0, float(step > 5)]
-        goes_on += [float(step < 9), 0.0]
-    return Decisions(
-        states=np.array(states),
-        actions=np.array(actions),
-        rewards=np.array(rewards),
-        afters=np.array(afters),
-        goes_on=np.array(goes_on),
-    )
-
-
-def test_it_learns_to_wait_until_it_pays() -> None:
-    network = untrained("belief", (2, 16, 16, 2), seed=3)
-    learned = learned_from(network, stopping(), QLearning(updates=2500, target_every=50))
-    early, late = (
-        values_of(learned.layers, np.array([[each, 1.0] for each in steps]))
-        for steps in ((0.0, 0.2, 0.4), (0.7, 0.9))
-    )
-    assert (early[:, 0] > early[:, 1] + 0.2).all()
-    assert (late[:, 1] > 0.6).all()
-    assert early[:, 0] == pytest.approx(1.0, abs=0.2), "who waits can still go in time"
-
-
-def test_the_same_seed_gives_the_same_bytes() -> None:
-    network = untrained("belief", (2, 16, 16, 2), seed=3)
-    one, again, other = (
-        learned_from(network, stopping(), QLearning(seed=seed, updates=50)).layers[0][0].tobytes()
-        for seed in (1, 1, 2)
-    )
-    assert one == again != other
 
 
 def test_one_state_has_the_values_that_a_policy_computes() -> None:
