@@ -439,6 +439,7 @@ def _environment() -> dict[str, str]:
         **own,
         **cpu_dispatch.environment_of_programs(),
         "QT_QPA_PLATFORM": "offscreen",
+        "TZ": "UTC",
     }
 
 

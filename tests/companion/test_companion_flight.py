@@ -157,11 +157,11 @@ FAILURES: dict[str, tuple[str, str, str]] = {
     "raises a text of 9 MB": ("raise ValueError('x' * 9_000_000)", "ValueError", "xxx"),
     "does not parse": ("def f(:", "SyntaxError", "lander.py"),
     "wants a package": ("import picamera2", "ModuleNotFoundError", "install it for"),
-    "forks": ("import os; os.fork()", "RuntimeError", "the program forks"),
+    "forks": ("import os; os.fork()", "RuntimeError", "the program calls os.fork"),
     "starts processes": (
         "import multiprocessing as m\nm.get_context('fork').Process(target=print).start()",
         "RuntimeError",
-        "use a thread",
+        "use threading.Thread, or subprocess (lander.py, line 2)",
     ),
     "opens a window": ("import cv2; cv2.namedWindow('x')", "RuntimeError", "no display"),
     "writes into the link": (

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.companion.processes import gradient, running
 
 
@@ -118,9 +120,12 @@ def test_asyncio_waits_in_the_flights_time_with_executors_too(tmp_path: Path) ->
 
 def test_random_numbers_and_the_order_of_sets_are_the_same_in_each_process(tmp_path: Path) -> None:
     text = """
-        import os, random, uuid
+        import os, random, secrets, uuid
         import numpy
         print(random.random(), uuid.uuid4(), os.urandom(4), {"a", "b", "c"}, numpy.random.rand())
+        random.seed()
+        print(random.random(), random.Random().random(), random.SystemRandom().random())
+        print(secrets.token_hex(), numpy.random.default_rng().random())
     """
     printed = []
     for _ in range(2):
@@ -219,3 +224,165 @@ def test_threads_that_are_no_daemons_run_on_and_functions_at_exit_are_called(
     """
     with running(tmp_path, text) as simulator:
         assert simulator.fly(1).printed == "late\nat exit 0.3\n"
+
+
+IN_THE_FLIGHTS_TIME: dict[str, tuple[str, str]] = {
+    "datetime": (
+        """
+        import datetime, pickle
+        from datetime import date, datetime as when, timedelta, timezone
+        time.sleep(0.5)
+        moments = when.now(), when.utcnow(), when.today(), when.now(timezone.utc)
+        print({each.strftime("%F %T") for each in moments}, date.today())
+        later = pickle.loads(pickle.dumps(moments[0])) + timedelta(hours=1)
+        print(isinstance(later, when), isinstance(later, date), isinstance(date.today(), when))
+        class Mine(when): pass
+        print(isinstance(Mine.now(), Mine), isinstance(later, Mine), issubclass(Mine, when))
+        """,
+        "{'2023-11-14 22:13:20'} 2023-11-14\nTrue True False\nTrue False True",
+    ),
+    "time": (
+        """
+        import os
+        time.sleep(0.5)
+        real = time.CLOCK_REALTIME, time.CLOCK_MONOTONIC
+        counts = [f() for f in (time.time_ns, time.monotonic_ns, time.perf_counter_ns)]
+        counts += [f() for f in (time.process_time_ns, time.thread_time_ns)]
+        counts += [time.clock_gettime_ns(each) for each in real]
+        seconds = [time.clock_gettime(each) for each in real] + [os.times().elapsed]
+        seconds += [time.time(), time.perf_counter(), time.process_time(), time.thread_time()]
+        print({round(each / 1e9 % 100, 1) for each in counts})
+        print({round(each % 100, 1) for each in seconds})
+        print({time.ctime(), time.asctime(), time.strftime("%a %b %d %T %Y")})
+        print({time.localtime()[:5], time.gmtime()[:5], time.localtime(1.7e9)[:5]})
+        """,
+        "{0.5}\n{0.5}\n{'Tue Nov 14 22:13:20 2023'}\n{(2023, 11, 14, 22, 13)}",
+    ),
+    "a clock in a class": (
+        """
+        import logging, sys
+        class Rate:
+            clock, sleep = time.time, time.sleep
+        Rate().sleep(0.5)
+        print("%.1f" % (Rate().clock() % 100))
+        logging.basicConfig(format="%(asctime)s %(message)s", stream=sys.stdout)
+        logging.warning("late")
+        """,
+        "0.5\n2023-11-14 22:13:20,500 late",
+    ),
+    "timeouts": (
+        """
+        import asyncio, queue, sched, threading
+        def say(*what): print(*what, "%.1f" % time.monotonic())
+        threading.Timer(0.1, say, ("timer",)).start()
+        say(threading.Event().wait(0.2))
+        for each in (queue.Queue(), queue.SimpleQueue()):
+            try: each.get(timeout=0.1)
+            except queue.Empty: say("empty")
+        barrier = threading.Barrier(2)
+        threading.Timer(0.1, barrier.wait).start()
+        barrier.wait()
+        plan = sched.scheduler()
+        plan.enter(0.1, 1, say, ("plan",))
+        plan.run()
+        async def main():
+            try: await asyncio.wait_for(asyncio.sleep(9), 0.1)
+            except asyncio.TimeoutError: say("over")
+            await asyncio.to_thread(time.sleep, 0.1)
+            await asyncio.wait([asyncio.ensure_future(asyncio.sleep(9))], timeout=0.1)
+            say("waited")
+        asyncio.run(main())
+        """,
+        "timer 0.1\nFalse 0.2\nempty 0.3\nempty 0.4\nplan 0.6\nover 0.7\nwaited 0.9",
+    ),
+    "select, poll and epoll": (
+        """
+        import select, selectors, socket
+        def say(found): print(bool(found), "%.1f" % time.monotonic())
+        one, other = socket.socketpair()
+        waits = select.poll()
+        waits.register(one, select.POLLIN)
+        say(waits.poll(100))
+        with select.epoll() as epoll:
+            epoll.register(one.fileno(), select.EPOLLIN)
+            say(epoll.poll(0.1))
+            say(select.select([one], [], [], 0.1)[0])
+            for kind in (selectors.DefaultSelector, selectors.SelectSelector):
+                selector = kind()
+                selector.register(one, selectors.EVENT_READ)
+                say(selector.select(0.1))
+            other.send(b"x")
+            say(epoll.poll(1, maxevents=1) == [(one.fileno(), select.EPOLLIN)])
+        """,
+        "False 0.1\nFalse 0.2\nFalse 0.3\nFalse 0.4\nFalse 0.5\nTrue 0.5",
+    ),
+    "pipes and pools of threads": (
+        """
+        import multiprocessing, os, queue, select, threading
+        from multiprocessing.pool import ThreadPool
+        end, other = os.pipe()
+        threading.Timer(0.1, os.write, (other, b"x")).start()
+        print(select.select([end], [], [], 1)[0] == [end], "%.1f" % time.monotonic())
+        threading.Timer(0.1, os.write, (other, b"y")).start()
+        print(os.read(end, 1), os.read(end, 1), "%.1f" % time.monotonic())
+        with ThreadPool(2) as pool:
+            print(pool.map(lambda each: (time.sleep(0.1), each)[1], [1, 2, 3]))
+        mail = multiprocessing.Queue()
+        try: mail.get(timeout=0.1)
+        except queue.Empty: print("%.1f" % time.monotonic())
+        """,
+        "True 0.1\nb'x' b'y' 0.2\n[1, 2, 3]\n0.5",
+    ),
+    "a loop with handlers of signals and another program": (
+        """
+        import asyncio, signal
+        async def main():
+            asyncio.get_running_loop().add_signal_handler(signal.SIGINT, print)
+            pipe = asyncio.subprocess.PIPE
+            child = await asyncio.create_subprocess_exec("echo", "out", stdout=pipe)
+            print((await child.communicate())[0], await child.wait())
+        asyncio.run(main())
+        """,
+        "b'out\\n' 0",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", IN_THE_FLIGHTS_TIME)
+def test_it_runs_in_the_flights_time(tmp_path: Path, case: str) -> None:
+    text, expected = IN_THE_FLIGHTS_TIME[case]
+    with running(tmp_path, f"        import time{text}") as simulator:
+        printed = simulator.fly(1.2).printed
+        assert simulator.failure == ""
+    assert printed.strip() == expected
+
+
+REFUSED = {
+    "os.fork": "import os\nos.fork()",
+    "os.execv": "import os\nos.execvp('ls', ['ls'])",
+    "signal.alarm": "import signal\nsignal.alarm(1)",
+    "signal.setitimer": "import signal\nsignal.setitimer(signal.ITIMER_REAL, 1)",
+    "signal.sigwait": "import signal\nsignal.sigwait({signal.SIGINT})",
+    "multiprocessing's Process.start": "from multiprocessing import get_context as g\n"
+    "g('spawn').Process(target=print).start()",
+    "multiprocessing's Process.start, in a pool": "import multiprocessing as m\nm.Pool(1)",
+    "multiprocessing's Process.start, in an executor": "import concurrent.futures as c\n"
+    "c.ProcessPoolExecutor(1).submit(print)",
+    "multiprocessing's SharedMemory": "from multiprocessing.shared_memory import SharedMemory\n"
+    "SharedMemory(create=True, size=9)",
+    "a Python program by asyncio": "import asyncio\n"
+    "asyncio.run(asyncio.create_subprocess_exec('python', 'lander.py'))",
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_has_no_place_in_the_flights_time_is_refused_with_its_line(
+    tmp_path: Path, what: str
+) -> None:
+    with running(tmp_path, REFUSED[what]) as simulator:
+        simulator.fly(0.2)
+        assert what.partition(",")[0] in simulator.failure
+        assert "which cannot run in the flight's time; use" in simulator.failure
+        assert simulator.answer is not None
+        assert simulator.answer.failure is not None
+        assert simulator.answer.failure["line"] == "lander.py, line 2"

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import collections
 import errno
+import math
+import os
 import select
 import selectors
 import socket
 import sys
 import types
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 from .turns import Task, Turns
 
 POLL_S = 100e-6
 """What a look at an empty socket takes: loops that poll shall end."""
+PIPE_S = 1e-3
+"""How often a pipe is looked at that may have something to read."""
 VEHICLE_PORTS = (*range(5760, 5780), *range(14500, 14700))
 """Where the vehicle listens, and where a program that listens hears it: MAVLink's usual ports."""
 VEHICLE = ("127.0.0.1", 14555)
@@ -38,6 +42,8 @@ class Network:
         self.bound: dict[tuple[int, Any], Socket] = {}
         self.to_vehicle: list[Socket] = []
         """The ends of links to the vehicle, in the order in which they were opened."""
+        self.pipes: set[int] = set()
+        """Ends of pipes among the program's own threads."""
         self.mailboxes: list[bytearray] = []
         """Of other processes that the program has started."""
         self._port = 40_000
@@ -324,15 +330,19 @@ class Selection:
 
     def wait(self, timeout: float | None) -> tuple[list[Any], list[Any]]:
         """Return them; real files alone are waited for in real time, as for another program."""
-        if (
-            (self._real or self._real_writes)
-            and not self._ends
-            and len(self._writes) == len(self._real_writes)
-        ):
+        network = self._network
+        inside = self._ends or len(self._writes) > len(self._real_writes)
+        inside = inside or not network.pipes.isdisjoint(map(_number, self._real))
+        if not inside and (self._real or self._real_writes):
             found = _real_select(self._real, self._real_writes, [], timeout)
             return found[0], found[1]
-        found = self._network.wait(self._ready, self._ends, timeout)
-        return found or ([], [])
+        until_s = math.inf if timeout is None else network.turns.now_s + timeout
+        while self._real and until_s - network.turns.now_s > PIPE_S:
+            # Nobody tells of real files.
+            if found := network.wait(self._ready, self._ends, PIPE_S):
+                return found  # type: ignore[no-any-return]
+        rest_s = None if timeout is None else max(until_s - network.turns.now_s, 0.0)
+        return network.wait(self._ready, self._ends, rest_s) or ([], [])
 
     def _ready(self) -> tuple[list[Any], list[Any]] | None:
         known = self._network.sockets
@@ -369,10 +379,11 @@ def install(network: Network) -> None:
         reads, writes = list(reads), list(writes)
         return (*Selection(network, reads, writes).wait(timeout), [])
 
+    _install_pipes(network)
     change_select: Any = select
     change_select.select = selected
-    for name in ("poll", "epoll"):
-        setattr(change_select, name, lambda *_, **__: Poll(network))
+    change_select.poll = lambda: Poll(network, 1e-3)
+    change_select.epoll = lambda *_, **__: Poll(network, 1.0)
     base: Any = selectors._BaseSelectorImpl
 
     class Selector(base):  # type: ignore[misc]
@@ -398,11 +409,29 @@ def install(network: Network) -> None:
         setattr(change_selectors, f"{name}Selector", Selector)
 
 
-class Poll:
-    """``select.poll`` and ``select.epoll`` over this network."""
+def _install_pipes(network: Network) -> None:
+    real, read, changes = os.pipe, os.read, cast(Any, os)
 
-    def __init__(self, network: Network) -> None:
-        self._network = network
+    def pipe() -> tuple[int, int]:
+        ends = real()
+        # Those of subprocess lead to another program, which runs in real time.
+        if sys._getframe(1).f_globals.get("__name__") != "subprocess":
+            network.pipes.update(ends)
+        return ends
+
+    def read_when_ready(number: int, size: int) -> bytes:
+        if number in network.pipes and os.get_blocking(number):
+            Selection(network, [number], []).wait(None)
+        return read(number, size)
+
+    changes.pipe, changes.read = pipe, read_when_ready
+
+
+class Poll:
+    """``select.poll`` and ``select.epoll`` over this network; they differ in the unit of time."""
+
+    def __init__(self, network: Network, unit_s: float) -> None:
+        self._network, self._unit_s = network, unit_s
         self._wanted: dict[int, int] = {}
 
     def register(self, each: Any, events: int = select.POLLIN) -> None:
@@ -415,17 +444,23 @@ class Poll:
         """Watch it no more."""
         del self._wanted[_number(each)]
 
-    def poll(self, timeout: float | None = None, *_: Any) -> list[tuple[int, int]]:
-        """Return what is ready; the time is in milliseconds."""
+    def poll(self, timeout: float | None = None, maxevents: int = -1) -> list[tuple[int, int]]:
+        """Return what is ready."""
+        del maxevents
         reads = [each for each, events in self._wanted.items() if events & select.POLLIN]
         writes = [each for each, events in self._wanted.items() if events & select.POLLOUT]
-        wait_s = None if timeout is None or timeout < 0 else timeout / 1000
+        wait_s = None if timeout is None or timeout < 0 else timeout * self._unit_s
         can_read, can_write = Selection(self._network, reads, writes).wait(wait_s)
         found = [(each, select.POLLIN) for each in can_read]
         return found + [(each, select.POLLOUT) for each in can_write]
 
-    def close(self) -> None:
+    def close(self, *_: Any) -> None:
         """Do nothing: it holds nothing."""
+
+    __exit__ = close
+
+    def __enter__(self) -> Poll:
+        return self
 
 
 def _numeric(host: Any) -> Any:

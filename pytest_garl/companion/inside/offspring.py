@@ -17,6 +17,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from .turns import refusing
+
 RUNNER = str(Path(__file__).with_name("start.py"))
 SLICE_S = 0.02
 """How often it gets time at least: frames and bytes of the vehicle wait no longer."""
@@ -44,6 +46,7 @@ def python_words(command: Any, options: dict[str, Any]) -> list[str] | None:
 def install(host: Any, header: struct.Struct) -> None:
     """Let ``subprocess`` start Python programs in the time of this host."""
     turns, network, sight = host.turns, host.network, host.sight
+    no_asyncio = refusing("starts a Python program by asyncio", "subprocess.Popen")
 
     class Popen(_RealPopen):  # type: ignore[misc]
         """A process; one that runs Python is carried by a task."""
@@ -54,6 +57,8 @@ def install(host: Any, header: struct.Struct) -> None:
             if words is None:
                 super().__init__(command, *more, **options)
                 return
+            if sys._getframe(1).f_globals.get("__name__", "").startswith("asyncio"):
+                no_asyncio()
             self._link, theirs = _real_pair()
             settings = {**host.settings, "link": theirs.fileno(), "arguments": words[1:]}
             kept = {name: options[name] for name in ("cwd", "env") if name in options}

@@ -198,11 +198,22 @@ def install(host: Host) -> None:
         name: lambda module: sight.change_apriltag(module, host.sight)
         for name in ("pupil_apriltags", "dt_apriltags", "pyapriltags")
     }
+
+    def no_process(name: str) -> Any:
+        return turns.refusing(f"calls multiprocessing's {name}", "threading.Thread, or subprocess")
+
     sys.meta_path.insert(
         0,
         Hooks(
             {
                 "cv2": lambda module: sight.change_cv2(module, host.sight),
+                "datetime": turns.change_datetime,
+                "multiprocessing.process": lambda module: setattr(
+                    module.BaseProcess, "start", no_process("Process.start")
+                ),
+                "multiprocessing.shared_memory": lambda module: setattr(
+                    module.SharedMemory, "__init__", no_process("SharedMemory")
+                ),
                 "numpy": lambda module: module.random.seed(0),
                 "serial": lambda module: network.serial_module(host.network, module),
                 **tags,
@@ -211,22 +222,31 @@ def install(host: Host) -> None:
     )
     if importlib.util.find_spec("serial") is None:
         network.serial_module(host.network, None)
-    import random
-
-    random.seed(0)
-    bits = random.Random(1)
+    _install_random()
     changes: Any = os
-    changes.urandom = lambda size: bits.getrandbits(8 * size).to_bytes(size, "big") if size else b""
-    changes.fork = changes.forkpty = _no_fork
+    for name in ("fork", "forkpty", "execv", "execve"):
+        setattr(changes, name, turns.refusing(f"calls os.{name}", "a thread, or subprocess"))
     sys.stdout, sys.stderr = host.printed, host.printed
     sys.stdin = io.StringIO()
 
 
-def _no_fork() -> int:
-    raise RuntimeError(
-        "the program forks (os.fork, or multiprocessing with its default start method); a copy of "
-        "its process has no place in the flight's time: use a thread, or subprocess"
+def _install_random() -> None:
+    """Give random numbers without a seed the same ones in each flight."""
+    import random
+
+    random.seed(0)
+    bits = random.Random(1)
+    changes: Any = random
+    seed = random.Random.seed
+    changes.Random.seed = lambda self, a=None, version=2: seed(
+        self, bits.getrandbits(64) if a is None else a, version
     )
+    changes.seed = changes._inst.seed
+
+    def urandom(size: int) -> bytes:
+        return bits.getrandbits(8 * size).to_bytes(size, "big") if size else b""
+
+    os.urandom = changes._urandom = urandom
 
 
 def run(arguments: list[str]) -> None:
@@ -246,7 +266,7 @@ def failure_of(error: BaseException) -> dict[str, Any]:
     frames = traceback.extract_tb(error.__traceback__)
     own = [each for each in frames if not _is_carrier(each.filename)]
     last = own[-1] if own else None
-    inside = [each for each in own if "site-packages" not in each.filename and each.line] or own
+    inside = [each for each in own if each.line and not _is_library(each.filename)] or own
     if inside:
         last = inside[-1]
     lines = traceback.format_list(own) + traceback.format_exception_only(type(error), error)
@@ -257,6 +277,10 @@ def failure_of(error: BaseException) -> dict[str, Any]:
         "line": f"{Path(last.filename).name}, line {last.lineno}" if last else "",
         "trace": "".join(lines)[-20_000:],
     }
+
+
+def _is_library(name: str) -> bool:
+    return "site-packages" in name or name.startswith(str(Path(os.__file__).parent))
 
 
 def _is_carrier(name: str) -> bool:
@@ -299,6 +323,8 @@ def _finish() -> None:
     import atexit
     import threading
 
+    for call in reversed(getattr(threading, "_threading_atexits", ())):
+        call()  # Of executors: their threads wait for it.
     for each in threading.enumerate():
         if each is not threading.current_thread() and not each.daemon:
             each.join()

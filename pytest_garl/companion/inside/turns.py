@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import _thread
 import heapq
+import os
 import queue
 import signal
 import threading
@@ -212,32 +213,109 @@ def install(turns: Turns) -> None:
     changes._active_limbo_lock = threading.RLock()
     queue.time = time.monotonic  # type: ignore[attr-defined]
     queue.SimpleQueue = queue._PySimpleQueue  # type: ignore[attr-defined, misc]
-    signal.pause = lambda: turns.park(None)  # type: ignore[assignment]
+    changes = signal
+    changes.pause = lambda: turns.park(None)
+    # It wants a real socket, and tells asyncio of signals that no flight has.
+    changes.set_wakeup_fd = lambda *_, **__: -1
+    for name in ("alarm", "setitimer", "sigwait", "sigwaitinfo", "sigtimedwait"):
+        setattr(changes, name, refusing(f"calls signal.{name}", "threading.Timer"))
+
+
+class Clocks:
+    """The functions of ``time`` that read a clock.
+
+    They are methods: a function that a program keeps in a class would become a method of its
+    objects there, as ``time.localtime`` in ``logging.Formatter``, and those of C do not.
+    """
+
+    def __init__(self, turns: Turns) -> None:
+        self._turns = turns
+        self._gmtime, self._localtime = time.gmtime, time.localtime
+        self._asctime, self._strftime = time.asctime, time.strftime
+        self.monotonic = self.perf_counter = self.process_time = self.thread_time = turns.clock_s
+
+    def time(self) -> float:
+        return EPOCH_S + self._turns.clock_s()
+
+    def time_ns(self) -> int:
+        return round(1e9 * EPOCH_S) + self.monotonic_ns()
+
+    def monotonic_ns(self) -> int:
+        return round(1e9 * self._turns.clock_s())
+
+    perf_counter_ns = process_time_ns = thread_time_ns = monotonic_ns
+
+    def clock_gettime(self, clock: int) -> float:
+        return self.time() if clock == time.CLOCK_REALTIME else self._turns.clock_s()
+
+    def clock_gettime_ns(self, clock: int) -> int:
+        return self.time_ns() if clock == time.CLOCK_REALTIME else self.monotonic_ns()
+
+    def gmtime(self, seconds: float | None = None) -> Any:
+        return self._gmtime(self.time() if seconds is None else seconds)
+
+    def localtime(self, seconds: float | None = None) -> Any:
+        return self._localtime(self.time() if seconds is None else seconds)
+
+    def ctime(self, seconds: float | None = None) -> str:
+        return self._asctime(self.localtime(seconds))
+
+    def asctime(self, moment: Any = None) -> str:
+        return self._asctime(moment or self.localtime())
+
+    def strftime(self, form: str, moment: Any = None) -> str:
+        return self._strftime(form, moment or self.localtime())
+
+    def sleep(self, seconds: float) -> None:
+        if seconds < 0:
+            raise ValueError("sleep length must be non-negative")
+        self._turns.park(self._turns.now_s + max(seconds, TICK_S))
 
 
 def _install_clocks(turns: Turns) -> None:
-    changes: Any = time
-    for name in ("monotonic", "perf_counter", "process_time", "thread_time"):
-        setattr(changes, name, turns.clock_s)
-        setattr(changes, f"{name}_ns", lambda: round(1e9 * turns.clock_s()))
-    changes.time = lambda: EPOCH_S + turns.clock_s()
-    changes.time_ns = lambda: round(1e9 * EPOCH_S) + round(1e9 * turns.clock_s())
-    changes.clock_gettime = lambda clock: changes.time() if clock == 0 else turns.clock_s()
-    for name in ("gmtime", "localtime", "ctime"):
-        setattr(changes, name, _of_now(getattr(time, name)))
-    formatted = time.strftime
-    changes.strftime = lambda form, moment=None: formatted(form, moment or changes.localtime())
-
-    def sleep(seconds: float) -> None:
-        if seconds < 0:
-            raise ValueError("sleep length must be non-negative")
-        turns.park(turns.now_s + max(seconds, TICK_S))
-
-    changes.sleep = sleep
+    clocks = Clocks(turns)
+    for name in dir(clocks):
+        if name[0] != "_":
+            setattr(time, name, getattr(clocks, name))
+    changes: Any = os
+    kind: Any = os.times_result
+    changes.times = lambda: kind((turns.clock_s(), 0.0, 0.0, 0.0, turns.now_s))
 
 
-def _of_now(convert: Callable[[float], Any]) -> Callable[..., Any]:
-    return lambda seconds=None: convert(time.time() if seconds is None else seconds)
+def change_datetime(module: Any) -> None:
+    """Let ``datetime`` read the flight's clock: its type in C reads that of the system."""
+    real: Any = module.datetime
+
+    class Kind(type):
+        """Takes what C makes for an object of the class that the program knows."""
+
+        def __instancecheck__(cls, value: object) -> bool:
+            return isinstance(value, real) if cls is Datetime else super().__instancecheck__(value)
+
+    class Datetime(real, metaclass=Kind):  # type: ignore[misc]
+        """A date and a time."""
+
+        @classmethod
+        def now(cls, tz: Any = None) -> Any:
+            return cls.fromtimestamp(time.time(), tz)
+
+        @classmethod
+        def utcnow(cls) -> Any:
+            return cls.now(module.timezone.utc).replace(tzinfo=None)
+
+    Datetime.__module__, Datetime.__name__, Datetime.__qualname__ = 3 * ("datetime",)
+    module.datetime = Datetime
+
+
+def refusing(what: str, instead: str) -> Callable[..., Any]:
+    """Return a function that raises, in place of what cannot run in the flight's time."""
+
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise RuntimeError(
+            f"the program {what}, which cannot run in the flight's time; use {instead}"
+        )
+
+    return refuse
 
 
 def _install_threads(turns: Turns) -> None:
