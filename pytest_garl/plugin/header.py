@@ -15,6 +15,7 @@ from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import counted, duration
 from pytest_garl.plugin.time_left import FIRST_FLIGHTS
 from pytest_garl.reports.run_text import limits_text
+from pytest_garl.search.method_catalogue import method_names
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
 _DEFAULT_LEDGER = f"{RUN_FOLDER}/{SEARCH_LEDGER}"
@@ -85,8 +86,9 @@ def cpu_dispatch_warning(run: Run) -> list[str]:
     effects = []
     if options.workers == 0:
         effects.append("flown in a worker process, not inside pytest")
-    if options.searches_or_repeats:
-        effects.append("scenarios bred here may differ from those bred on another make of CPU")
+    if options.searches_or_repeats and options.method not in method_names():
+        bred = f"scenarios that {options.method} breeds here may differ on another make of CPU"
+        effects.append(bred)
     if not libraries or not effects:
         return []
     cause = f"loaded before pytest-garl could choose its instructions: {', '.join(libraries)}"

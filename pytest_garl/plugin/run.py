@@ -223,7 +223,7 @@ class Run:
         """End the investigations and the workers."""
         if self.investigations is not None:
             self.investigations.close()
-        self.searches.teacher.close()
+        self.searches.close()
         self.pool.close()
 
     @functools.cached_property

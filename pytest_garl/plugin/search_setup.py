@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from pytest_garl.cpu_dispatch import libraries_off_baseline
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import SearchKind
 from pytest_garl.execution.flight_id import Slot
@@ -29,7 +30,8 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.breeder import Breeder
 from pytest_garl.search.fixed import FixedScenarios
 from pytest_garl.search.method import Method, SearchPlan
-from pytest_garl.search.method_catalogue import make_method
+from pytest_garl.search.method_catalogue import make_method, method_names
+from pytest_garl.search.separate_method import MethodProcess, SeparateMethod
 from pytest_garl.search.teaching import Lessons, Teacher
 from pytest_garl.simulation.npc_policy import PolicySpec
 
@@ -47,6 +49,13 @@ class Searches:
     """Breeders of the searches that the ledger has."""
     teacher: Teacher = field(default_factory=Teacher)
     """Trains the directors of the searches."""
+    method_process: MethodProcess = field(default_factory=MethodProcess)
+    """Breeds for them if this process computes otherwise than others do."""
+
+    def close(self) -> None:
+        """End the processes of the searches."""
+        self.teacher.close()
+        self.method_process.close()
 
     def select(self, target: Target) -> None:
         """Add the target of a selected item."""
@@ -128,7 +137,7 @@ class Searches:
         job = self.job(target, npcs)
         removed = target.case.scenario.removed_objects if target.case else ()
         check_policy(npcs, load_map(job.map, self.options.map_folders).without(removed))
-        method = self._method(target, wanted)
+        method = self._method(search, target, wanted)
         slots = _by_generation(wanted)
         flights = len(wanted)
         if method.learns:
@@ -158,7 +167,7 @@ class Searches:
             return None
         return Lessons(self.teacher, search, job, airframe)
 
-    def _method(self, target: Target, wanted: Mapping[Slot, Target]) -> Method:
+    def _method(self, search: str, target: Target, wanted: Mapping[Slot, Target]) -> Method:
         if target.entry or self.options.repeat:
             return FixedScenarios(
                 {slot: _scenario_of(self.options, each) for slot, each in wanted.items()}
@@ -171,7 +180,10 @@ class Searches:
             seed=self.options.seed,
             population=self.options.population,
         )
-        return make_method(self.options.method, plan)
+        name = self.options.method
+        if name in method_names() and libraries_off_baseline():
+            return SeparateMethod(self.method_process, search, name, plan)
+        return make_method(name, plan)
 
 
 def _by_generation(slots: Iterable[Slot]) -> dict[int, list[int]]:

@@ -41,7 +41,7 @@ class Breeder:
             slots = self._wanted.get(self._next_generation, ())
             if self._method.learns and self._next_generation < self._last_generation:
                 slots = range(len(scenarios))
-            if isinstance(self._method, TellsOrigins):
+            if isinstance(self._method, TellsOrigins) and self._method.origins:
                 self._ledger.facts.note_origins(
                     self._search, self._next_generation, self._method.origins
                 )

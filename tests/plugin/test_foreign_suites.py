@@ -132,6 +132,7 @@ def test_a_clean_search_is_green_in_a_suite_with_habits(
     result = _session(pytester, HABITS[name], CALM)
     assert result.ret == pytest.ExitCode.OK
     result.stdout.fnmatch_lines(["*on lawn: 4 flown, landed 100.0 %*", "ledger: *"])
+    assert "make of CPU" not in result.stdout.str(), "what is bred does not depend on it"
 
 
 @pytest.mark.parametrize("name", HABITS)
