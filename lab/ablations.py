@@ -142,14 +142,15 @@ def _table(rows: list[Row]) -> str:
             if index < COMPARED:
                 rivals = [of_garl.get((row["seed"], row["map"])) for row in own]
                 pairs = zip(values, rivals, strict=True)
-                texts.append(_interval([a - measure(b) for a, b in pairs if b], variant))
+                differences = [a - measure(b) for a, b in pairs if b]
+                texts.append("–" if variant == "garl" else interval(differences))
         lines.append(f"| {variant} | {len(own)} | {' | '.join(texts)} |")
     return "\n".join(lines)
 
 
-def _interval(differences: Sequence[float], variant: str) -> str:
+def interval(differences: Sequence[float]) -> str:
     """Return the mean of paired differences with its interval (Student's t)."""
-    if variant == "garl" or len(differences) < 3:
+    if len(differences) < 3:
         return "–"
     error = float(np.std(differences, ddof=1)) / len(differences) ** 0.5
     half = float(t.ppf((1 + LEVEL) / 2, len(differences) - 1)) * error

@@ -30,15 +30,17 @@ from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import Origin
+from pytest_garl.files.run_files import ARCHIVE
 from pytest_garl.npcs.domain_policy import domain_with_policy
 from pytest_garl.reports.search_origins import MoverRecord, mover_record
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.scenarios.files import dump_scenario, parse_scenario
 from pytest_garl.scenarios.genes import ON_ABOVE, Genome
+from pytest_garl.search.archive import Knowledge, flown_by, read_archive
 from pytest_garl.search.breeder import Breeder
 from pytest_garl.search.columns import Columns
-from pytest_garl.search.method import SearchPlan
+from pytest_garl.search.method import SearchPlan, archived_name
 from pytest_garl.search.method_catalogue import make_method
 
 LEAST_SHARE = 0.5
@@ -49,10 +51,11 @@ NO_NPCS = MoverRecord(director=0, rule=0, gene=0, policy=0, interfering=0, direc
 class SearchCount:
     """What one search bred: numbers of flights.
 
-    ``true_children`` name at least two parents, all of them flown in earlier generations, and have
-    of each a condition or an NPC with all of its values.  In ``by_own`` of the flights in which the
-    director decides it has weights that it learned in this search.  ``bred_again`` says whether the
-    same scenarios were bred from the results, or else what came out.
+    ``true_children`` name at least two parents, all of them flown in earlier generations or in the
+    archive with which the search began, and have of each a condition or an NPC with all of its
+    values.  In ``by_own`` of the flights in which the director decides it has weights that it
+    learned in this search.  ``bred_again`` says whether the same scenarios were bred from the
+    results, or else what came out.
     """
 
     name: str
@@ -81,28 +84,40 @@ def count(path: Path) -> list[SearchCount]:
                 shutil.copy(path.with_name(path.name + suffix), folder)
         ledger = Ledger(copy)
         try:
-            return [_count(ledger, search) for search, _ in ledger.searches()]
+            return [_count(ledger, search, path.parent) for search, _ in ledger.searches()]
         finally:
             ledger.close()
 
 
-def _count(ledger: Ledger, search: str) -> SearchCount:
+def _count(ledger: Ledger, search: str, folder: Path) -> SearchCount:
+    """Count a search; the archive with which it began lies in a folder."""
     job = parse_job(ledger.job(search) or "")
     key, facts = ledger.facts.searches[search], ledger.facts.reported
     map = job.load_map()
     genome = genome_of(domain_with_policy(key.domain or facts["domain"]), map)
     flights = ledger.queries.flights(search)
     made = _origins(ledger, search, flights)
-    known = {flight.id.slot_id: flight for flight in flights}
+    own = Knowledge()
+    if name := ledger.facts.archive:
+        archive = read_archive(folder / ARCHIVE.format(name))
+        own = archive.knowledge(search, flown_by(job.dumps()), genome, map)
+    known = {each.id.slot_id: (each.id.slot.generation, each.scenario) for each in flights}
+    for number, each in enumerate(own.known):
+        known[archived_name(number)] = -1, dump_scenario(each.scenario)
     bred = [(flight, origin) for flight, origin in made if origin.how == "bred"]
     taught = [e for e in flights if ledger.facts.director(search, e.id.slot.generation)]
     plan = SearchPlan(
-        map=map, genome=genome, seed=int(facts["seed"]), population=int(facts["population"])
+        map=map,
+        genome=genome,
+        seed=int(facts["seed"]),
+        population=int(facts["population"]),
+        known=own.known,
+        suspects=own.suspects,
     )
     return SearchCount(
         name=key.place,
         control=sum(origin.how == "control" for _, origin in made),
-        stratified=sum(origin.how == "stratified" for _, origin in made),
+        stratified=sum(origin.how in ("stratified", "replayed") for _, origin in made),
         children=len(bred),
         true_children=sum(_is_child(*each, known, genome) for each in bred),
         movers=mover_record((flight, job.npcs) for flight in flights) or NO_NPCS,
@@ -126,9 +141,12 @@ def _origins(
 
 
 def _is_child(
-    flight: LedgerFlight, origin: Origin, known: dict[str, LedgerFlight], genome: Genome
+    flight: LedgerFlight, origin: Origin, known: dict[str, tuple[int, str]], genome: Genome
 ) -> bool:
-    """Whether a flight has of each of two or more earlier flights a condition or an NPC."""
+    """Whether a flight has of each of two or more earlier flights a condition or an NPC.
+
+    ``known`` are generation and scenario of all flights, by the names that origins have for them.
+    """
     parents = [known.get(name) for name in origin.parents]
     generation, columns = flight.id.slot.generation, Columns(genome)
     row = encode(parse_scenario(flight.scenario), genome)
@@ -139,9 +157,9 @@ def _is_child(
         if each.start not in columns.bits or row[each.start] > ON_ABOVE
     ]
     for parent in parents:
-        if parent is None or parent.id.slot.generation >= generation:
+        if parent is None or parent[0] >= generation:
             return False
-        other = encode(parse_scenario(parent.scenario), genome)
+        other = encode(parse_scenario(parent[1]), genome)
         if not any(np.array_equal(row[each], other[each]) for each in acting):
             return False
     return len(parents) >= 2

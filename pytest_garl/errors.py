@@ -50,6 +50,10 @@ class LedgerError(GarlError):
     """A ledger that cannot be opened, written or continued."""
 
 
+class ArchiveError(GarlError):
+    """An archive of searches that cannot be read."""
+
+
 class PoolError(GarlError):
     """Flying processes that cannot be started, or cannot go on."""
 

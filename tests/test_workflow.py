@@ -103,6 +103,28 @@ def test_search_of_the_night_leaves_what_is_uploaded(project: Path) -> None:
     assert [path for path in uploaded if not (project / path).exists()] == []
 
 
+def test_archive_of_a_night_is_restored_used_and_saved_though_the_night_fails(
+    project: Path,
+) -> None:
+    restored, saved = (step for step in STEPS if "cache/" in step.get("uses", ""))
+    assert restored["with"]["path"] == saved["with"]["path"] == "${{ inputs.archive }}"
+    key = restored["with"]["key"]
+    assert key == saved["with"]["key"]
+    assert key.startswith(restored["with"]["restore-keys"])
+    # A cache never changes: each run needs a key of its own.
+    assert "github.run_id" in key
+    assert (restored["if"], saved["if"]) == (
+        "inputs.archive != ''",
+        "always() && inputs.archive != ''",
+    )
+    for seed in "01":
+        few = f"--garl-budget=8 --garl-shrink=0 --garl-seed={seed}"
+        done = sh("Fly", "search", project, ARGUMENTS=few, ARCHIVE="night.archive")
+        assert done.returncode in (0, 1), done.stdout + done.stderr
+        assert (project / "night.archive").is_file()
+    assert re.search("^archive: .*, 16 flights known", done.stdout, re.M)
+
+
 def test_arguments_of_the_action_are_words_of_a_shell(project: Path) -> None:
     done = sh("Fly", "gate", project, ARGUMENTS="-k 'time and nothing' --co -q")
     assert "test_lands_in_time" in done.stdout

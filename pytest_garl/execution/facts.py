@@ -26,9 +26,10 @@ _SESSION = "session "
 """Begins the keys of facts that hold for one session of pytest; a resumed run forgets them."""
 _TWIN = "twin "
 _SEARCH = "search "
+_KNOWLEDGE = "knowledge of "
 _USER_FAILURES = "own failures"
-_VERSION, _SOURCES = "version", "sources of pytest-garl"
-_REPORTED = ("seed", "budget", "method", "population", "domain", "npcs", "python")
+_VERSION, _SOURCES, _ARCHIVE = "version", "sources of pytest-garl", "archive"
+_REPORTED = ("seed", "budget", "method", "population", "domain", "npcs", "python", "archive")
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True, order=True)
@@ -104,15 +105,17 @@ class Facts:
         map: str,
         domain: str,
         npcs: str | None,
+        archive: str | None,
     ) -> dict[str, Any]:
         """Return what must be equal when a run is resumed."""
         named = {_VERSION: version, _SOURCES: package_sha256, "python": python, "seed": seed}
         wanted = {"budget": budget, "method": method, "population": population}
-        return {**named, **wanted, "map": map, "domain": domain, "npcs": npcs}
+        places = {"map": map, "domain": domain, "npcs": npcs}
+        return {**named, **wanted, **places, _ARCHIVE: archive}
 
     @property
     def reported(self) -> dict[str, Any]:
-        """Seed, budget, method, population, domain, NPC policy and Python of the run."""
+        """Seed, budget, method, population, domain, NPC policy, Python and archive of the run."""
         return self.of_run(_REPORTED)
 
     @property
@@ -139,6 +142,26 @@ class Facts:
     def domain(self) -> str | None:
         """The session's domain."""
         return self._text("domain")
+
+    @property
+    def archive(self) -> str | None:
+        """The hash of the archive that the run began with, None without one."""
+        return self._text(_ARCHIVE)
+
+    def note_knowledge(self, search: str, known: int, suspects: int) -> None:
+        """Note how many flights of the archive a search knows, and how many it flies again."""
+        self._set(f"{_KNOWLEDGE}{search}", [known, suspects])
+
+    @property
+    def knowledge(self) -> tuple[int, int]:
+        """How many flights of the archive all searches know, and how many they fly again."""
+        found = [
+            self._get(key)
+            for (key,) in self.database.execute(
+                "SELECT key FROM run WHERE substr(key, 1, ?) = ?", (len(_KNOWLEDGE), _KNOWLEDGE)
+            )
+        ]
+        return sum(int(known) for known, _ in found), sum(int(again) for _, again in found)
 
     def note_began(self, at: datetime | None = None) -> None:
         """Note when the run begins: at a time in UTC, or now."""

@@ -15,17 +15,18 @@ from pytest_garl.flight.flight import Crash
 from pytest_garl.messages import visible
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Verdict
 
-How = Literal["control", "stratified", "bred"]
+How = Literal["control", "stratified", "bred", "replayed"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
     """How the scenario of a slot was made: by chance, without parents, or from flights.
 
+    A replayed one failed in an earlier search, of other code, another system or another domain.
     ``parents`` are the slots of the flights whose conditions and NPCs a child has, such as
-    ``court-g00-s03``.  ``expected`` is what the model of the landing system predicted: the
-    proximity of each property, from 1 on a violation; ``fails`` the probability of a violation,
-    None without a model.
+    ``court-g00-s03``, or ``archived-17`` for one of an earlier search.  ``expected`` is what the
+    model of the landing system predicted: the proximity of each property, from 1 on a violation;
+    ``fails`` the probability of a violation, None without a model.
     """
 
     how: How

@@ -14,11 +14,16 @@ from pytest_garl.errors import SavingError
 
 def write_text_atomically(path: Path, text: str) -> Path:
     """Write a file atomically and return its path; make its folder if it is missing."""
+    return write_bytes_atomically(path, text.encode())
+
+
+def write_bytes_atomically(path: Path, content: bytes) -> Path:
+    """Write a file atomically and return its path; make its folder if it is missing."""
     incomplete = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with incomplete.open("w", encoding="utf-8", newline="") as file:
-            file.write(text)
+        with incomplete.open("wb") as file:
+            file.write(content)
             file.flush()
             os.fsync(file.fileno())
         incomplete.replace(path)

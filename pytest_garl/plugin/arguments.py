@@ -171,6 +171,12 @@ def add_options(parser: pytest.Parser) -> None:
     )
     parser.addini("garl_cases", help=f"Folder of the saved cases (default: {CASES_FOLDER}).")
     parser.addini(
+        "garl_archive",
+        help="File in which searches keep their flights for later searches: read when a search "
+        "begins, written when it ends (default: none).",
+        default="",
+    )
+    parser.addini(
         "garl_xfail_strict",
         help="Whether an open saved case that passes fails the run.",
         type="bool",

@@ -105,8 +105,15 @@ def _search_line(run: Run) -> str:
     return (
         f"garl: {resuming}budget {options.budget} per system and map, method {options.method}, "
         f"seed {options.seed}, NPCs {options.policy_in(options.domain)}, "
-        f"domain {options.domain.name}, {_workers(run)}"
+        f"domain {options.domain.name}{_archive(run)}, {_workers(run)}"
     )
+
+
+def _archive(run: Run) -> str:
+    """Return which archive the search begins with; empty if no ini key names one."""
+    if run.options.archive is None:
+        return ""
+    return f", archive {run.ledger.facts.archive or 'none yet'}"
 
 
 def _findings_so_far(run: Run, config: pytest.Config) -> list[str]:

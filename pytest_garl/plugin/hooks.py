@@ -317,9 +317,10 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 def _save_cases(run: Any, session: pytest.Session, *, nothing_compared: bool) -> None:
     try:
         from pytest_garl.plugin.kind_news import write_last_news
-        from pytest_garl.plugin.save_cases import may_save, save_cases
+        from pytest_garl.plugin.save_cases import may_save, save_archive, save_cases
 
         write_last_news(run, session.config)
+        save_archive(run, session)
         if may_save(run, session) and not nothing_compared:
             save_cases(run, session)
     except Exception as error:  # noqa: BLE001 (the summary, which follows, says what it was)

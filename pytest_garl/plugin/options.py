@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.files.run_files import CASES_FOLDER, REPEAT_LEDGER, SEARCH_LEDGER
+from pytest_garl.files.run_files import ARCHIVE, CASES_FOLDER, REPEAT_LEDGER, SEARCH_LEDGER
 from pytest_garl.npcs.domain_policy import domain_with_policy, policy_in
 from pytest_garl.npcs.policy_catalogue import policy_names
 from pytest_garl.plugin.arguments import OPTIONS, Option
@@ -83,6 +83,8 @@ class Options:
     """What a violation is that no selected test asserts."""
     probes: Literal["first", "always", "never"]
     """When a search flies the probes of a landing system before."""
+    archive: Path | None
+    """The file that carries what searches know to later ones."""
     cases: Path
     cases_named: bool
     """Whether the ini file or the command line names the folder of the cases."""
@@ -113,6 +115,10 @@ class Options:
     def repeat_ledger(self) -> Path:
         """The file of the ledger of a repeated scenario, which leaves that of the search alone."""
         return self.folder / REPEAT_LEDGER
+
+    def archive_named(self, sha256: str) -> Path:
+        """Return the file that keeps the archive with which the run began."""
+        return self.folder / ARCHIVE.format(sha256)
 
     @property
     def flights(self) -> Path:
@@ -177,6 +183,7 @@ def read_options(config: pytest.Config) -> Options:
             config, "garl_unasserted", ("fail", "note"), "fail" if os.environ.get("CI") else "note"
         ),
         probes=_word(config, "garl_probes", ("first", "always", "never")),
+        archive=_file(config, "garl_archive"),
         cases=config.rootpath / str(config.getini("garl_cases") or CASES_FOLDER),
         cases_named=bool(config.getini("garl_cases")),
         folder=folder,
@@ -237,6 +244,11 @@ def _baseline(config: pytest.Config) -> Path | None:
     if text and not (folder / text).is_file():
         raise wrong("baseline", text, "a file that `garl baseline save` wrote")
     return folder / text if text else None
+
+
+def _file(config: pytest.Config, key: str) -> Path | None:
+    text = str(config.getini(key))
+    return config.rootpath / text if text else None
 
 
 def _report(config: pytest.Config) -> Path | None:

@@ -31,6 +31,7 @@ from pytest_garl.plugin.target import Target
 from pytest_garl.scenarios.files import dump_scenario, parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.archive import Archive
 from pytest_garl.simulation.npc_policy import PolicySpec
 
 if TYPE_CHECKING:
@@ -136,6 +137,8 @@ class Run:
     simulator: Reference
     corpus: Corpus
     """The saved cases."""
+    archive: Archive = field(default_factory=Archive)
+    """What earlier searches knew when the run began."""
     lock: TextIO | None = None
     """Keeps other runs out of the folder."""
     investigations: Investigations | None = None
@@ -177,7 +180,12 @@ class Run:
     """The slot of each search up to which all selected slots are flown."""
 
     def __post_init__(self) -> None:
-        self.searches = Searches(options=self.options, ledger=self.ledger, simulator=self.simulator)
+        self.searches = Searches(
+            options=self.options,
+            ledger=self.ledger,
+            simulator=self.simulator,
+            archive=self.archive,
+        )
         self._early_reflights = EarlyReflights(self)
 
     def select(self, items: Sequence[pytest.Item]) -> None:

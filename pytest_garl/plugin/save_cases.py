@@ -31,12 +31,24 @@ _PATCH = ".patch"
 
 def may_save(run: Run, session: pytest.Session) -> bool:
     """Return whether a search ended in this process, so that its violations may be saved."""
+    return run.investigations is not None and _has_ended(run, session)
+
+
+def save_archive(run: Run, session: pytest.Session) -> None:
+    """Write what the searches know for later ones, if they have ended in this process."""
+    options = run.options
+    if options.archive is None or options.repeat or not options.budget:
+        return
+    if _has_ended(run, session):
+        run.archive.with_ledger(run.ledger).save(options.archive)
+
+
+def _has_ended(run: Run, session: pytest.Session) -> bool:
+    """Return whether all flights of the searches are flown, and this process ends the run."""
     worker = is_xdist_worker(session.config)
     ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
     stopped = bool(session.shouldfail or session.shouldstop)
     if not (ended and run.loop_finished) or stopped or worker:
-        return False
-    if run.investigations is None:
         return False
     # After a second Ctrl-C pytest still has the status with which it began.
     return all(each.flown >= each.total for each in run.ledger.queries.progress())

@@ -27,10 +27,11 @@ from pytest_garl.scenarios.domains.own_navigation import within
 from pytest_garl.scenarios.files import load
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.archive import Archive, Knowledge, flown_by
 from pytest_garl.search.breeder import Breeder
 from pytest_garl.search.fixed import FixedScenarios
 from pytest_garl.search.method import Method, SearchPlan
-from pytest_garl.search.method_catalogue import make_method, method_names
+from pytest_garl.search.method_catalogue import make_method, method_names, remembers
 from pytest_garl.search.separate_method import MethodProcess, SeparateMethod
 from pytest_garl.search.teaching import Lessons, Teacher
 from pytest_garl.simulation.npc_policy import PolicySpec
@@ -43,6 +44,8 @@ class Searches:
     options: Options
     ledger: Ledger
     simulator: Reference
+    archive: Archive = field(default_factory=Archive)
+    """What earlier searches knew."""
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
     """Targets of the selected items, by search and slot."""
     breeders: dict[str, Breeder] = field(default_factory=dict)
@@ -137,7 +140,7 @@ class Searches:
         job = self.job(target, npcs)
         removed = target.case.scenario.removed_objects if target.case else ()
         check_policy(npcs, load_map(job.map, self.options.map_folders).without(removed))
-        method = self._method(search, target, wanted)
+        method = self._method(search, target, wanted, job)
         slots = _by_generation(wanted)
         flights = len(wanted)
         if method.learns:
@@ -167,18 +170,26 @@ class Searches:
             return None
         return Lessons(self.teacher, search, job, airframe)
 
-    def _method(self, search: str, target: Target, wanted: Mapping[Slot, Target]) -> Method:
+    def _method(
+        self, search: str, target: Target, wanted: Mapping[Slot, Target], job: FlightJob
+    ) -> Method:
         if target.entry or self.options.repeat:
             return FixedScenarios(
                 {slot: _scenario_of(self.options, each) for slot, each in wanted.items()}
             )
         map = load_map(target.map, self.options.map_folders)
         domain = within(target.domain, target.navigation)
+        genome, own = genome_of(domain, map, target.task), Knowledge()
+        if self.archive.searches and remembers(self.options.method):
+            own = self.archive.knowledge(search, flown_by(job.dumps()), genome, map)
+            self.ledger.facts.note_knowledge(search, len(own.known), len(own.suspects))
         plan = SearchPlan(
             map=map,
-            genome=genome_of(domain, map, target.task),
+            genome=genome,
             seed=self.options.seed,
             population=self.options.population,
+            known=own.known,
+            suspects=own.suspects,
         )
         name = self.options.method
         if name in method_names() and libraries_off_baseline():

@@ -27,6 +27,7 @@ from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.termination import interrupt_on_sigterm
 from pytest_garl.plugin.xdist import is_xdist_worker
+from pytest_garl.search.archive import Archive, read_archive
 
 if TYPE_CHECKING:
     from pytest_garl.cases.investigation_queue import Investigations
@@ -52,6 +53,7 @@ def begin_run(config: pytest.Config, options: Options) -> None:
             investigations=_investigations(config, options, ledger, pool),
             simulator=reference_to(own) if own else BUILT_IN,
             corpus=corpus_of(config, options),
+            archive=_archive(ledger, options),
             lock=lock,
             flight_s=ledger.facts.earlier_flight_s,
         )
@@ -77,10 +79,14 @@ def _open_ledger(config: pytest.Config, options: Options) -> tuple[Ledger, TextI
     # The earlier ledger makes room for the new one.
     earlier_s = stored_flight_s(options.search_ledger)
     if options.resume:
-        ledger = Ledger.resume(path, _facts(options))
+        facts = _facts(options)
+        if options.archive is not None:
+            # The file may have changed since: the run goes on with what its ledger names.
+            del facts["archive"]
+        ledger = Ledger.resume(path, facts)
         check_stored(ledger)
     else:
-        ledger = Ledger.create(path, _facts(options))
+        ledger = Ledger.create(path, _facts(options, _keep_archive(options)))
         ledger.facts.note_began()
     if earlier_s:
         ledger.facts.note_earlier_flight_s(earlier_s)
@@ -98,7 +104,33 @@ def _ledger_file(options: Options) -> Path:
     return options.repeat_ledger if options.repeat else options.search_ledger
 
 
-def _facts(options: Options) -> dict[str, Any]:
+def _keep_archive(options: Options) -> str | None:
+    """Copy the archive beside the ledger, so that the run can be resumed; return its hash."""
+    for path in options.folder.glob(options.archive_named("*").name):
+        path.unlink(missing_ok=True)
+    if options.archive is None or options.repeat or not options.archive.exists():
+        return None
+    archive = read_archive(options.archive)
+    archive.save(options.archive_named(archive.sha256))
+    return archive.sha256
+
+
+def _archive(ledger: Ledger, options: Options) -> Archive:
+    """Return the archive that the ledger names."""
+    name = ledger.facts.archive
+    if name is None:
+        return Archive()
+    path = options.archive_named(name)
+    found = read_archive(path) if path.exists() else Archive()
+    if found.sha256 != name:
+        raise LedgerError(
+            f"{path}: the archive {name} that this run began with is not there; run without "
+            "--garl-resume to begin anew"
+        )
+    return found
+
+
+def _facts(options: Options, archive: str | None = None) -> dict[str, Any]:
     """Return the facts that must be equal when the run is resumed."""
     return Facts.that_identify(
         version=version("pytest-garl"),
@@ -112,6 +144,7 @@ def _facts(options: Options) -> dict[str, Any]:
         map=",".join(options.maps),
         domain=options.domain.label,
         npcs=options.policy_in(options.domain),
+        archive=archive,
     )
 
 

@@ -30,6 +30,7 @@ from pytest_garl.reports.run_text import (
     kinds_lines,
     share_lines,
 )
+from pytest_garl.search.method_catalogue import remembers
 
 NO_FILMS: Mapping[str, Path] = MappingProxyType({})
 _SKIPPED = f"Skipped: {NOT_JUDGED}:"
@@ -124,7 +125,8 @@ def _cases_outside(reporter: Any) -> list[str]:
 
 def _lines_about(record: RunRecord, run: Run, tally: Tally, reporter: Any) -> list[str]:
     width, films = width_of(reporter.config), run.films or Films()
-    lines = [
+    lines = [wrapped(text, width, others="  ") for text in archive_lines(run)]
+    lines += [
         line
         for each in record.searches
         for line in search_table(each, reporter.config, width, films.of_search(each.name))
@@ -139,6 +141,20 @@ def _lines_about(record: RunRecord, run: Run, tally: Tally, reporter: Any) -> li
     )
     lines += [wrapped(world, width, others="  ") for world in worlds]
     return [*lines, f"ledger: {record.ledger}  results {record.results_sha256[:16]}"]
+
+
+def archive_lines(run: Run) -> list[str]:
+    """Return what the searches began with and what they left, if an ini key names an archive."""
+    options, facts = run.options, run.ledger.facts
+    if options.archive is None or options.repeat:
+        return []
+    if facts.archive is None:
+        return [f"archive: none when the search began, which is written to {options.archive.name}"]
+    if not remembers(options.method):
+        return [f"archive: {facts.archive}, which the method {options.method} does not use"]
+    known, suspects = facts.knowledge
+    again = f", {suspects} to fly again that failed in other searches" if suspects else ""
+    return [f"archive: {facts.archive}, {known} flights known{again}"]
 
 
 def legend(kinds: Iterable[KindRecord]) -> str:

@@ -130,6 +130,7 @@ def _unlike(before: RunRecord, after: RunRecord) -> Iterable[Side]:
             "seed": run.options.seed,
             "domain": run.options.domain,
             "npcs": run.options.npcs,
+            "archive": run.options.archive or "none",
             "pytest-garl": run.version,
             "finished": "yes" if run.complete else "no",
         }

@@ -386,6 +386,8 @@ class RunOptions:
     domain: str | None
     npcs: str | None
     python: str | None
+    archive: str | None
+    """The hash of the archive that it began with."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

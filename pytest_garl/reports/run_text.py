@@ -32,7 +32,12 @@ LEGEND = {
 }
 """Meanings of the types of violations and findings: a signature's part before the first colon."""
 
-_MADE: Mapping[How, str] = {"control": "random", "stratified": "stratified", "bred": "bred"}
+_MADE: Mapping[How, str] = {
+    "control": "random",
+    "stratified": "stratified",
+    "bred": "bred",
+    "replayed": "replayed",
+}
 
 TELLING_NPCS = 10
 """Means of fewer NPCs are chance."""

@@ -19,7 +19,7 @@ from pytest_garl.search.model import PROPERTIES, proximities
 from pytest_garl.search.operators import Matrix
 from pytest_garl.simulation.npc_policy import PolicySpec
 
-HOWS: tuple[How, ...] = ("control", "stratified", "bred")
+HOWS: tuple[How, ...] = ("control", "stratified", "bred", "replayed")
 
 Made = Sequence[tuple[LedgerFlight, Origin]]
 """The flights of a search in order, each with how its scenario was made."""

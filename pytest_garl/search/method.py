@@ -13,21 +13,33 @@ from pytest_garl.scenarios.scenario import Scenario
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SearchPlan:
-    """The task of a search: its map, its genes, its seed and the size of a generation."""
-
-    map: Map
-    genome: Genome
-    seed: int
-    population: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class FlownScenario:
     """A scenario with the result of its flight."""
 
     scenario: Scenario
     result: FlightResult
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchPlan:
+    """The task of a search: its map, its genes, its seed and the size of a generation.
+
+    ``known`` are flights of earlier searches that would fly alike today.  ``suspects`` are
+    scenarios in which something failed that is not the same: another system, or this one before it
+    was changed.  The first generation depends on neither.
+    """
+
+    map: Map
+    genome: Genome
+    seed: int
+    population: int
+    known: tuple[FlownScenario, ...] = ()
+    suspects: tuple[Scenario, ...] = ()
+
+
+def archived_name(number: int) -> str:
+    """Return what the origins of children call a flight that ``SearchPlan.known`` holds."""
+    return f"archived-{number}"
 
 
 class Method(Protocol):
@@ -79,3 +91,5 @@ class MethodDeclaration:
     """The NPC policy that belongs to the method; ``--garl-npcs`` overrides it."""
     extra: str = ""
     """The extra of pytest-garl that holds packages which only this method needs."""
+    remembers: bool = False
+    """Whether it uses what an archive says of earlier searches."""

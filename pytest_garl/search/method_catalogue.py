@@ -45,6 +45,11 @@ def default_policy(name: str) -> str:
     return declaration_of(name).policy if name in method_names() else DEFAULT_POLICY
 
 
+def remembers(name: str) -> bool:
+    """Return whether a method uses an archive; a user's own may."""
+    return name not in method_names() or declaration_of(name).remembers
+
+
 def find_method(name: str) -> Callable[[SearchPlan], Method]:
     """Return the factory of a shipped method, or of one named "module:factory"."""
     if name in method_names():

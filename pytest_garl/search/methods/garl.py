@@ -14,6 +14,9 @@ The second generation waits for the control.  From then on a generation is bred 
 it is flown, from the results of those before that: no worker waits for the last flight of a
 generation.
 
+Flights of earlier searches that would fly alike are learned from like those of this one, after the
+control is drawn.  Scenarios that failed elsewhere take places of stratified ones.
+
 A scenario that is flown like an earlier one is not flown again: its difference is a value that
 does not count.
 """
@@ -38,7 +41,12 @@ from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.bandit import Bandit
 from pytest_garl.search.columns import Columns
 from pytest_garl.search.exploration import Exploration
-from pytest_garl.search.method import FlownScenario, MethodDeclaration, SearchPlan
+from pytest_garl.search.method import (
+    FlownScenario,
+    MethodDeclaration,
+    SearchPlan,
+    archived_name,
+)
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.search.model import PROPERTIES, MarginModel, proximities
 from pytest_garl.search.objectives import violation_proximity
@@ -69,6 +77,8 @@ class GarlParameters:
 
     bred_share: float = 0.5
     """Share of the flights after the control that are children; all others are stratified."""
+    replayed_share: float = 0.25
+    """Largest share of a generation whose scenarios failed in another search."""
     shuffled: bool = False
     """Whether the model is fitted to results that are exchanged among the flights: a placebo, which
     has the same machinery and knows nothing."""
@@ -109,6 +119,7 @@ class Garl:
         self._flown: list[FlownScenario] = []
         """The flights of these generations, in order; ``_rows`` are their chromosomes."""
         self._rows: list[Matrix] = []
+        self._suspects = deque(plan.suspects)
         self.origins: Sequence[Origin] = ()
 
     def ask(self) -> Sequence[Scenario]:
@@ -119,14 +130,19 @@ class Garl:
             self._choices.update((dump_scenario(scenario), "") for scenario in control)
             self.origins = [Origin(how="control") for _ in control]
             return control
+        if self._generation == 1:
+            self._remember(plan.known)
         # Later results may be known already, which depends on who flies.
         wanted = max(1, self._generation - 1)
         for flown in self._told[self._learned : wanted]:
             self._learn(flown)
         self._learned = wanted
         children = deque(self._children(sum(map(self._is_bred, range(plan.population)))))
+        replayed = deque(self._replayed())
         made = [
-            children.popleft() if children and self._is_bred(place) else self._stratified()
+            children.popleft()
+            if children and self._is_bred(place)
+            else (replayed.popleft() if replayed else self._stratified())
             for place in range(plan.population)
         ]
         self.origins = [origin for _, origin in made]
@@ -148,8 +164,27 @@ class Garl:
         self._told.append(flown)
         return [(violation_proximity(item.result),) for item in flown]
 
+    def _remember(self, known: Sequence[FlownScenario]) -> None:
+        """Learn from flights of earlier searches as from those of this one."""
+        for item in known:
+            text = dump_scenario(item.scenario)
+            if text not in self._choices:
+                self._choices[text] = self._stratum(encode(item.scenario, self._plan.genome))
+        self._learn(known)
+
+    def _replayed(self) -> Iterator[tuple[Scenario, Origin]]:
+        """Yield the suspects of a generation, in place of stratified scenarios."""
+        count = math.ceil(self._parameters.replayed_share * self._plan.population)
+        while count and self._suspects:
+            scenario = self._suspects.popleft()
+            if self._is_new(scenario, self._stratum(encode(scenario, self._plan.genome))):
+                yield scenario, Origin(how="replayed")
+                count -= 1
+
     def _learn(self, flown: Sequence[FlownScenario]) -> None:
         """Learn which strata succeed, and draw events into the time that flights take."""
+        if not flown:
+            return
         self._flown += flown
         self._rows += [encode(item.scenario, self._plan.genome) for item in flown]
         self._exploration.flight_s = float(np.median([f.result.elapsed_s for f in self._flown]))
@@ -222,19 +257,23 @@ class Garl:
 
     def _origin(self, child: Chosen, parents: Sequence[int]) -> Origin:
         """Return what the ledger says of a child."""
-        slots = (divmod(parent, self._plan.population) for parent in parents)
         return Origin(
             how="bred",
-            parents=tuple(
-                Slot(generation=generation, index=index).id(self._plan.map.name)
-                for generation, index in slots
-            ),
+            parents=tuple(map(self._name, parents)),
             expected={
                 name: round(value, EXPECTED_DIGITS)
                 for name, value in zip(PROPERTIES, child.proximity, strict=True)
             },
             fails=round(child.fails, EXPECTED_DIGITS),
         )
+
+    def _name(self, flight: int) -> str:
+        """Return what the ledger calls a flight that was learned from."""
+        own = flight - len(self._plan.known)
+        if own < 0:
+            return archived_name(flight)
+        generation, index = divmod(own, self._plan.population)
+        return Slot(generation=generation, index=index).id(self._plan.map.name)
 
     def _stratified(self) -> tuple[Scenario, Origin]:
         """Return a scenario without parents that is flown unlike all earlier ones."""
@@ -262,4 +301,4 @@ class Garl:
         return repair(decode(row, plan.genome, map=plan.map.name, seed=seed), plan.map)
 
 
-METHOD = MethodDeclaration(make=Garl, policy="dqn")
+METHOD = MethodDeclaration(make=Garl, policy="dqn", remembers=True)
