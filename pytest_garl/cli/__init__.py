@@ -26,6 +26,7 @@ COMMANDS = {
     "film": "film",
     "init": "init",
     "report": "report",
+    "schema": "schema",
     "train": "train",
 }
 """The subcommands, and the module of each, without ``_command``."""

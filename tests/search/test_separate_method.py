@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from pytest_garl.errors import GarlError, PoolError
+from pytest_garl.search.method import FlownScenario
 from pytest_garl.search.method_catalogue import make_method
 from pytest_garl.search.separate_method import MethodProcess, SeparateMethod
-from tests.search.searches import bred, plan
+from tests.search.searches import bred, plan, result
 
 
 @pytest.mark.parametrize("name", ["garl", "ga", "random"])
@@ -22,6 +25,21 @@ def test_it_breeds_the_same(name: str) -> None:
             return
         assert bred(there, 3) == bred(here, 3)
         assert there.origins == list(getattr(here, "origins", ()))
+
+
+def test_it_knows_the_flights_of_an_archive() -> None:
+    known = tuple(
+        FlownScenario(scenario=each, result=result(each))
+        for made in bred(make_method("garl", plan(seed=1)), 3)
+        for each in made
+    )
+    remembering = dataclasses.replace(plan(), known=known)
+    here = bred(make_method("garl", remembering), 2)
+    with MethodProcess() as process:
+        there = SeparateMethod(process, "court", "garl", remembering)
+        assert bred(there, 2) == here
+        assert any("archived-" in name for each in there.origins for name in each.parents)
+    assert here != bred(make_method("garl", plan()), 2)
 
 
 def test_searches_share_the_process() -> None:
