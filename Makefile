@@ -84,8 +84,8 @@ test-ray: $(CLUSTERS)  ## the tests that start Ray clusters: minutes, so not par
 test-ros: $(READY) $(ROS)/.installed  ## the tests that run a ROS 2 node: 394 MB of wheels for Linux on x86-64
 	ROS_PYTHON=$(ROS)/bin/python $(BIN)/pytest tests/external/test_ros2.py
 
-test-dronekit: $(READY) $(DRONEKIT)/.installed  ## the test that flies real dronekit
-	DRONEKIT_PYTHON=$(DRONEKIT)/bin/python $(BIN)/pytest tests/companion/test_dronekit.py
+test-dronekit: $(READY) $(DRONEKIT)/.installed  ## the tests that fly real dronekit, and MAVSDK's package
+	DRONEKIT_PYTHON=$(DRONEKIT)/bin/python $(BIN)/pytest tests/companion/test_dronekit.py tests/companion/test_mavsdk.py
 
 # A warning is an error: a link to a page, a heading or a file that is not there.
 docs: $(SITE)  ## make a site with a search of the pages, in build/docs
@@ -150,7 +150,7 @@ $(CLUSTERS): $(READY)
 # ROS 2 has its own environment, as a user's node has: it flies beside pytest's, not in it.
 $(DRONEKIT)/.installed: | $(READY)
 	$(TESTED) -m venv $(DRONEKIT)
-	$(DRONEKIT)/bin/pip install --quiet --disable-pip-version-check dronekit2
+	$(DRONEKIT)/bin/pip install --quiet --disable-pip-version-check dronekit2 'mavsdk<4'
 	touch $@
 
 $(ROS)/.installed: | $(READY)

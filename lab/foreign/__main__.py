@@ -63,7 +63,7 @@ def main() -> None:
 def flown(foreign: Foreign, scenario: Scenario) -> tuple[Flight, Verdict]:
     """Fly one scenario, without anybody who moves, and judge it."""
     flight = fly(scenario, foreign.system, policy_spec("stationary"))
-    distance_m = default_distance_m(foreign.marker.side_m)
+    distance_m = default_distance_m(foreign.task.marker.side_m)
     return flight, judge(flight, dataclasses.replace(DEFAULT_LIMITS, distance_m=distance_m))
 
 

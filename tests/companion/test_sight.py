@@ -89,6 +89,17 @@ def test_detectors_that_are_made_for_each_picture_leave_pythons_memory_whole(
         assert simulator.fly(0.1).printed == "15000\n"
 
 
+def test_a_program_that_looks_for_opencv_before_its_import_has_the_camera(tmp_path: Path) -> None:
+    text = """
+        import importlib.util
+        assert importlib.util.find_spec("cv2") is not None
+        import cv2
+        print(cv2.VideoCapture(0).getBackendName())
+    """
+    with running(tmp_path, text) as simulator:
+        assert simulator.fly(0.1).printed == "GARL\n"
+
+
 def test_a_window_is_refused_or_ignored(tmp_path: Path) -> None:
     text = """
         import cv2, time

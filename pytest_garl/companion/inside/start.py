@@ -41,7 +41,7 @@ def load_inside() -> Any:
     package = importlib.util.module_from_spec(spec)
     sys.modules[NAME] = package
     spec.loader.exec_module(package)
-    for each in ("offspring", "turns", "network", "sight"):
+    for each in ("offspring", "turns", "network", "sight", "mavsdk_system"):
         importlib.import_module(f"{NAME}.{each}")
     return package
 
@@ -167,21 +167,26 @@ class Hooks:
 
     def __init__(self, changes: dict[str, Callable[[Any], None]]) -> None:
         self._changes = changes
+        self._busy: set[str] = set()
 
     def find_spec(self, name: str, path: Any = None, target: Any = None) -> Any:
         """Return the specification of a module that is changed after its import."""
-        if name not in self._changes:
+        # OpenCV imports itself, and a program may look for a module and import it later or never.
+        if name not in self._changes or name in self._busy:
             return None
-        change = self._changes.pop(name)
+        self._busy.add(name)
         spec = importlib.util.find_spec(name)
+        self._busy.discard(name)
         if spec is None or spec.loader is None:
             return None
         loader: Any = spec.loader
         execute = loader.exec_module
 
         def exec_module(module: Any) -> None:
+            self._busy.add(name)
             execute(module)
-            change(module)
+            self._busy.discard(name)
+            self._changes[name](module)
 
         loader.exec_module = exec_module
         return spec
@@ -199,6 +204,8 @@ def install(host: Host) -> None:
         for name in ("pupil_apriltags", "dt_apriltags", "pyapriltags")
     }
 
+    mavsdk = sys.modules[f"{NAME}.mavsdk_system"].change_mavsdk
+
     def no_process(name: str) -> Any:
         return turns.refusing(f"calls multiprocessing's {name}", "threading.Thread, or subprocess")
 
@@ -208,6 +215,8 @@ def install(host: Host) -> None:
             {
                 "cv2": lambda module: sight.change_cv2(module, host.sight),
                 "datetime": turns.change_datetime,
+                "mavsdk": mavsdk,
+                "mavsdk_grpc": mavsdk,
                 "multiprocessing.process": lambda module: setattr(
                     module.BaseProcess, "start", no_process("Process.start")
                 ),
