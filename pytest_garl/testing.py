@@ -292,12 +292,12 @@ class _Checker:
             try:
                 first = self._fly(self._system, self._calm, self._seconds)
                 result = judge.judge_flight(first.flight, self._plan.limits)
-                flights.append(f"{self._map.name}: {_ending(first.flight, result)}")
+                flights.append(f"{self._map.name}: {self._ending(first.flight, result)}")
                 cpu_s = first.cpu_s
                 self._note_result(first, result)
                 other = self._compare(first)
                 drawn = judge.judge_flight(other.flight, self._plan.limits)
-                ending = _ending(other.flight, drawn)
+                ending = self._ending(other.flight, drawn)
                 flights.append(f"{self._map.name}, another scenario: {ending}")
                 probed = self._probe(judge, first.flight)
                 if {result.outcome, drawn.outcome} == {"gave_up"}:
@@ -319,6 +319,12 @@ class _Checker:
             probes=probed,
             cpu_s=cpu_s,
         )
+
+    def _ending(self, flight: Flight, result: FlightResult) -> str:
+        if not self._whole and flight.outcome == "not_landed":
+            place = _place(flight, flight.elapsed_s)
+            return f"cut off after {self._seconds:g} s (--seconds), {place}"
+        return _landed(flight, result) or result.verdict.story
 
     def _probe(self, judge: JudgeProcess, twin: Flight) -> tuple[ProbeResult, ...]:
         """Fly the probes of a system that lands in clear air, with fresh instances."""
@@ -414,9 +420,8 @@ class _Checker:
         if not any(step.diagnostics for step in flight.steps):
             warn(
                 "returns no diagnostics: reports cannot say what it saw or intended to do. Return "
-                "with each command diagnostics=Diagnostics(target_m=(x, y, 0.0), detections=..., "
-                "phase=...): the place that it takes for the marker, the markers that it sees in "
-                "the frame, what it does"
+                f"with each command {self._diagnostics_example()}: the place that it takes for the "
+                "marker, the markers that it sees in the frame, what it does"
             )
         elif self._whole and not Evidence(flight).reports_anything:
             warn(
@@ -428,6 +433,11 @@ class _Checker:
                 f"slow: {first.cpu_s:.0f} s of computing for {flight.elapsed_s:.0f} s of flight, "
                 f"{self._meter.mean_s * 1e3:.0f} ms in each call"
             )
+
+    def _diagnostics_example(self) -> str:
+        if isinstance(self._system, ProgramSystem):
+            return '"diagnostics": {"target_m": [x, y, 0], "detections": [...], "phase": "..."}'
+        return "diagnostics=Diagnostics(target_m=(x, y, 0.0), detections=..., phase=...)"
 
     def _fly(
         self, system: Any, scenario: Scenario, seconds: float, *, raises: bool = True
@@ -461,10 +471,6 @@ _REMEMBERS = (
     "a later flight of one instance differs from the first of a fresh one; reset(mission) must "
     "forget the flight before"
 )
-
-
-def _ending(flight: Flight, result: FlightResult) -> str:
-    return _landed(flight, result) or result.verdict.story
 
 
 def _landed(flight: Flight, result: FlightResult) -> str:

@@ -83,8 +83,8 @@ def read_hello(line: bytes) -> Hello:
     version = answer.get("protocol")
     if version != VERSION:
         raise BadMessageError(
-            f"speaks version {shown(version)} of the protocol; expected {VERSION}. `garl client` "
-            "writes the Python module and the C++ header that speak it",
+            f'speaks version {shown(version)} of the protocol; expected {VERSION}: answer "hello" '
+            f'with "protocol": {VERSION}',
             "OtherProtocol",
         )
     _only(answer, ("protocol", "frame", "reads"), "hello")
@@ -139,10 +139,8 @@ def read_command(line: bytes, number: int, hello: Hello) -> Command:
     """
     answer = _read(line, *COMMANDS)
     if answer.get("frame") != number:
-        raise BadMessageError(
-            f"answered the frame {shown(answer.get('frame'))}; expected {number}, the frame of the "
-            "request"
-        )
+        found = f'"frame": {shown(answer["frame"])}' if "frame" in answer else 'no "frame"'
+        raise BadMessageError(f'answered {found}; expected "frame": {number}, as in the request')
     name = answer.pop("type")
     del answer["frame"]
     kind = COMMANDS[name]
@@ -152,7 +150,9 @@ def read_command(line: bytes, number: int, hello: Hello) -> Command:
         command: Command = kind(**_plain(_turned(answer, hello)), diagnostics=said)
     except TypeError as error:
         required = [each.name for each in dataclasses.fields(kind) if _is_required(each)]
-        raise BadMessageError(f"{name}: expected {listed(required)}") from error
+        raise BadMessageError(
+            f"{name}: found {listed(answer) or 'no fields'}; expected {listed(required)}"
+        ) from error
     return command
 
 
@@ -176,7 +176,10 @@ def _read_detection(value: Any, hello: Hello) -> Any:
     try:
         return Detection(**_plain(_turned(value, hello)))
     except TypeError as error:
-        raise BadMessageError(f"diagnostics.detections: expected {listed(names[:-1])}") from error
+        raise BadMessageError(
+            f"diagnostics.detections: found {listed(value) or 'nothing'}; expected "
+            f"{listed(names[:-1])} in each"
+        ) from error
 
 
 def _turned(facts: dict[str, Any], hello: Hello) -> dict[str, Any]:
@@ -207,11 +210,15 @@ def _read(line: bytes, *types: str) -> dict[str, Any]:
     """Return a message of one of the types; raise BadMessageError for anything else."""
     expected = " or ".join(types)
     try:
-        message = parse_json(line)
+        message = parse_json(line.decode())
+    except UnicodeDecodeError as error:
+        raise BadMessageError(
+            f"wrote {_shown(line)}, whose byte {error.start} is not UTF-8; expected JSON in UTF-8"
+        ) from None
     except ValueError as error:
         raise BadMessageError(
-            f"wrote {_shown(line)} to stdout ({error}); expected a line of JSON of the type "
-            f"{expected}. Nothing else belongs on stdout: print to stderr"
+            f"wrote {_shown(line)} to stdout, where nothing but answers belongs ({error}); "
+            f"expected a line of JSON of the type {expected}"
         ) from None
     if not isinstance(message, dict) or message.get("type") not in types:
         raise BadMessageError(

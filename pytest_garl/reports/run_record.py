@@ -40,6 +40,8 @@ marker for long enough; something never left it free for long enough."""
 NEVER_GAVE_UP = "late:never-gave-up"
 _BLOCKED = "The marker was blocked"
 """In the story of a flight in which something never left the marker free for long enough."""
+_CRASHES = {"raised": "Python error", "nonsense": "wrong answer"}
+"""What texts call a crash, if not by its kind."""
 LANDED, IDLE, INCONCLUSIVE = "landed", "idle", "inconclusive"
 """Ends of flights that violate nothing; idle is one in which nobody could have landed."""
 NO_PHASE = "not of a phase"
@@ -284,7 +286,7 @@ class SearchRecord:
         for each in self.flights:
             if each.result.verdict.violation_type == "V":
                 kind = each.result.crash.kind if each.result.crash else "raised"
-                counts[kind if kind in ("died", "hung", "broke") else "Python error"] += 1
+                counts[_CRASHES.get(kind, kind)] += 1
         return counts
 
     @property

@@ -19,7 +19,7 @@ LEGEND = {
     "II": "did not land: the marker could never be read, was lost, or was readable to the end",
     "III": "hit a fixed body",
     "IV": "hit a moving body",
-    "V": "Python error, death or hang of the landing system",
+    "V": "error, wrong answer, death or hang of the landing system",
     "late": "landed too late, or let the time run out in sight of the marker, on the ground or "
     "without giving up",
     "off": "came down too far from the marker, up to 1.5 m",

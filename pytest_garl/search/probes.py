@@ -193,10 +193,10 @@ def _hidden(twin: Flight, domain: Domain) -> _Made:
     yield "no-marker", "no marker is there for a minute", _cover(0.0, GONE_S), True
     near = _half_way(twin)
     if near is not None and near[0] < half_s - EARLIER_S:
-        when = f"from {near[0]:.1f} s on, {near[1]:.1f} m away,"
-        yield "marker-gone-early", f"{when} the marker is gone", _cover(near[0], GONE_S), True
+        early = f"from {near[0]:.1f} s on, {near[1]:.1f} m away, the marker is gone for a minute"
+        yield "marker-gone-early", early, _cover(near[0], GONE_S), True
     when = f"from {half_s:.1f} s on, {half_m:.1f} m up,"
-    yield "marker-gone", f"{when} the marker is gone", _cover(half_s, GONE_S), True
+    yield "marker-gone", f"{when} the marker is gone for a minute", _cover(half_s, GONE_S), True
     back = f"{when} the marker is gone, and back after {back_s:g} s"
     yield "marker-back", back, _cover(half_s, back_s), False
 

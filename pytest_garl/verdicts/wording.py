@@ -50,7 +50,9 @@ def headline(description: str) -> str:
             where = where.rpartition(", ")[0]
     what = what.partition("\n")[0].removesuffix(".")
     if what.startswith(("Python", _CRASH)):
-        return f"{what[:1].lower() if what.startswith(_CRASH) else 'P'}{what[1:]}{where}"
+        # What was raised may end in any words, which the place must not seem to go on with.
+        place = f" ({where.removeprefix(', ')})" if where else ""
+        return f"{what[:1].lower() if what.startswith(_CRASH) else 'P'}{what[1:]}{place}"
     # The place is that of what happened, not of what had been before.
     happened, mark, before = what.partition("; ")
     return f"{happened[:1].lower()}{happened[1:]}{where}{mark}{before}"

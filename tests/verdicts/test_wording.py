@@ -17,12 +17,12 @@ PLACE = "At 32.7 s the UAV was 1.4 m up, over the marker."
         ),
         (
             f"The landing system raised: IndexError: list index. Out of range. {PLACE}",
-            "Python error IndexError: list index. Out of range, 1.4 m up, over the marker",
+            "Python error IndexError: list index. Out of range (1.4 m up, over the marker)",
         ),
         (
             f"The landing system returned nonsense: BadCommand: step returned 3. {PLACE}",
-            "the landing system returned nonsense: BadCommand: step returned 3, 1.4 m up, over the "
-            "marker",
+            "the landing system returned nonsense: BadCommand: step returned 3 (1.4 m up, over the "
+            "marker)",
         ),
         (
             "Landed 3.0 m off the marker, on open ground; the marker had been in view; its target "

@@ -273,6 +273,7 @@ def _patch(evidence: Evidence | None) -> str:
     name = used.most_common(1)[0][0] if used else "PositionSetpoint"
     return (
         "To see its target here, return it with each command: "
-        f"{name}(..., diagnostics=Diagnostics(target_m=(x, y, 0.0))), where x, y is the place that "
-        "your system takes for the marker."
+        f"{name}(..., diagnostics=Diagnostics(target_m=(x, y, 0.0))), or from a program "
+        '"diagnostics": {"target_m": [x, y, 0]}, where x, y is the place that your system takes '
+        "for the marker."
     )

@@ -23,10 +23,14 @@ from pytest_garl.program import ProgramFailedError, ProgramSystem
 from pytest_garl.simulation.system_under_test.reading import NonsenseError
 
 _SIMULATION = Path(__file__).parents[1]
-_SIMULATION_FILES = {
+_OWN_FILES = {
     _SIMULATION.parent / "airframe.py",
     _SIMULATION.parent / "landing_system.py",
-    *_SIMULATION.rglob("*.py"),
+    *(
+        file
+        for room in ("simulation", "external", "companion", "execution")
+        for file in (_SIMULATION.parent / room).rglob("*.py")
+    ),
 }
 """Files whose frames are left out of the traceback of a landing system."""
 
@@ -128,7 +132,7 @@ def crash_of(error: BaseException, method: str) -> Crash:
     try:
         frames = traceback.extract_tb(error.__traceback__)
         system_frames = [
-            frame for frame in frames if Path(frame.filename).resolve() not in _SIMULATION_FILES
+            frame for frame in frames if Path(frame.filename).resolve() not in _OWN_FILES
         ]
         lines = traceback.format_list(system_frames) + traceback.format_exception_only(error)
         text = cut_middle("".join(lines), TRACEBACK_CHARS)
