@@ -12,7 +12,7 @@ import hashlib
 import os
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 from types import FrameType
@@ -36,7 +36,8 @@ class ProgramSystem(abc.ABC):
 
     ``name`` is an identifier, ``folder`` is where its relative paths begin (by default that of the
     module that makes it), ``sources`` are patterns of files below ``folder``, of which an empty
-    tuple means all files in ``home``, without tests and caches.  A subclass sets ``settings``: all
+    tuple means all files in ``home``, without tests and caches, and ``environment`` adds to the
+    environment of pytest.  A subclass sets ``settings``: all
     that decides how it flies besides its sources, in a form whose ``repr`` is the same in every
     process.
     """
@@ -47,8 +48,20 @@ class ProgramSystem(abc.ABC):
     settings: tuple[object, ...] = ()
 
     def __init__(
-        self, name: str, *, folder: str | Path | None, sources: Sequence[str], airframe: Airframe
+        self,
+        name: str,
+        *,
+        folder: str | Path | None,
+        sources: Sequence[str],
+        airframe: Airframe,
+        environment: Mapping[str, str] | None = None,
     ) -> None:
+        self.environment = dict(environment or {})
+        for key, value in self.environment.items():
+            if not isinstance(key, str) or not isinstance(value, str):
+                raise LandingSystemError(
+                    f"{name}: environment has {key!r}: {value!r}; expected texts, as 'SPEED': '2'"
+                )
         if isinstance(sources, str) or not all(isinstance(each, str) for each in sources):
             raise LandingSystemError(
                 f"{name}: sources={sources!r}: expected a list of patterns, as ['lander/**/*.py']"

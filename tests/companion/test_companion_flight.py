@@ -245,6 +245,12 @@ def _is_gone(pid: str) -> bool:
     return False
 
 
+def _old_python(folder: Path) -> str:
+    file = script(folder, "#!/bin/sh\necho 3.8\n", "python3.8")
+    file.chmod(0o755)
+    return str(file)
+
+
 BAD: dict[str, tuple[Callable[[Path], object], str]] = {
     "no text": (lambda folder: CompanionProgram("", folder=folder), "the line that starts"),
     "a quote": (lambda folder: CompanionProgram("python 'a", folder=folder), "No closing quot"),
@@ -264,6 +270,18 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
     "no python": (
         lambda folder: program(folder, "", python="venv/bin/python").check(),
         "there is no Python 'venv/bin/python'",
+    ),
+    "no Python": (
+        lambda folder: program(folder, "", python="/bin/ls").check(),
+        "there is no Python '/bin/ls'; expected 3.9 or later",
+    ),
+    "an old Python": (
+        lambda folder: program(folder, "", python=_old_python(folder)).check(),
+        "found Python 3.8 as",
+    ),
+    "vehicle": (
+        lambda folder: program(folder, "", vehicle="copter"),
+        "(vehicle='copter'): expected ArduCopter(...) or",
     ),
     "brace": (
         lambda folder: program(folder, "", "python lander.py {marker}").check(),
