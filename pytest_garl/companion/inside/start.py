@@ -199,7 +199,7 @@ def install(host: Host) -> None:
     sys.modules[f"{NAME}.offspring"].install(host, HEADER)
     tags = {
         name: lambda module: sight.change_apriltag(module, host.sight)
-        for name in ("pupil_apriltags", "dt_apriltags", "pyapriltags")
+        for name in ("apriltag", "dt_apriltags", "pupil_apriltags", "pyapriltags")
     }
 
     mavsdk = sys.modules[f"{NAME}.mavsdk_system"].change_mavsdk
