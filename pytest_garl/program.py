@@ -8,11 +8,13 @@ find it again: "module:name" is its id in ledgers, cases and baselines, as of a 
 from __future__ import annotations
 
 import abc
+import contextlib
 import hashlib
 import os
 import re
+import signal
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 from types import FrameType
@@ -175,6 +177,23 @@ AnySystem = type | ProgramSystem
 def program_named(module: str, name: str) -> ProgramSystem | None:
     """Return the program that a module of this process has made; None if it has made none."""
     return _made.get((module, name))
+
+
+def started_by(pid: int) -> list[int]:
+    """Return the ids of all processes below one, in any session, where the system tells (Linux)."""
+    found = [pid]
+    for each in found:
+        for file in Path(f"/proc/{each}/task").glob("*/children"):
+            with contextlib.suppress(OSError):
+                found += [int(child) for child in file.read_text().split()]
+    return found[1:]
+
+
+def kill(pids: Iterable[int]) -> None:
+    """Kill processes; those that have ended are left out."""
+    for pid in pids:
+        with contextlib.suppress(OSError):
+            os.kill(pid, signal.SIGKILL)
 
 
 def _making_module() -> dict[str, Any]:

@@ -35,7 +35,10 @@ import pytest
 from pytest_garl import Camera, CompanionProgram
 
 # How the program is started, with its arguments, and what its camera is.
-lander = CompanionProgram({words}, camera=Camera(width_px=640, height_px=480))
+lander = CompanionProgram(
+    {words},
+    camera=Camera(width_px=640, height_px=480),
+)
 """
 TEST = """\
 pytestmark = pytest.mark.garl(system={system}, maps=["court", "lawn"])
@@ -153,7 +156,7 @@ def _test_of_program(line: str, here: Path, folder: Path) -> str:
     """Return the tests of a companion program, which runs in the folder of its line."""
     words = json.dumps(line, ensure_ascii=False)
     if folder != here:
-        words += f', folder="{Path(os.path.relpath(here, folder)).as_posix()}"'
+        words += f',\n    folder="{Path(os.path.relpath(here, folder)).as_posix()}"'
     return PROGRAM.format(words=words) + TEST.format(system="lander")
 
 

@@ -66,7 +66,7 @@ def test_a_script_gets_a_test_that_starts_it(folder: Path) -> None:
     done = init("my lander.py")
     assert done.exit_code == 0, done.output
     written = (folder / "tests" / "test_my_lander.py").read_text()
-    assert """CompanionProgram("python 'my lander.py'", folder="..",""" in written
+    assert """CompanionProgram(\n    "python 'my lander.py'",\n    folder="..",\n""" in written
     assert "system=lander" in written
     assert "test_completes_the_mission[court-g00-s00]" in collected(folder)
 

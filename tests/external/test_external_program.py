@@ -159,7 +159,8 @@ def test_a_program_of_another_kind_is_a_finding(
 def test_nothing_of_a_flight_is_left(tmp_path: Path) -> None:
     """Neither the program, nor what it started, nor an open file."""
     mark = f"sleep-of-{tmp_path.name}"
-    starts = f"__import__('subprocess').Popen(['sh', '-c', 'exec sleep 99; : {mark}'])"
+    command = ["setsid", "sh", "-c", f"sh -c 'sleep 99; : {mark}' & exec true"]
+    starts = f"__import__('subprocess').run({command}, stdout=-3, stderr=-3)"
     before = len([*Path("/proc/self/fd").iterdir()])
     flight = flown(written(tmp_path, RISES.format(misbehaves=starts)))
     assert flight.crash is None
