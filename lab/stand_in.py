@@ -19,7 +19,7 @@ import numpy as np
 from lab.stand_in_way import ORDINARY, TAKE_OFF_S, Event, LandingModel, Way, meet_bodies
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.severity import NO_SEVERITY
-from pytest_garl.scenarios.groups import DECOY_KINDS, QUANTITIES
+from pytest_garl.scenarios.groups import DECOY_KINDS, MOMENTS, QUANTITIES
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
@@ -105,7 +105,9 @@ def _losses(scenario: Scenario) -> list[tuple[str, float, float]]:
 
 
 def _begins_s(scenario: Scenario, name: str, way: Way) -> float:
-    """Return when an event begins."""
+    """Return when an event begins; one that waits for a decision by the fixed rule, at 3 m."""
+    if name in scenario.decided_events:
+        return way.moments_s[MOMENTS.index("3 m")]
     moment = int(QUANTITIES[f"{name}.after"].flown(scenario[f"{name}.after"]))
     return way.moments_s[moment] + scenario[f"{name}.from_s"]
 
