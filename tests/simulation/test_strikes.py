@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from math import inf
 from typing import ClassVar
 
 import pytest
 
 from pytest_garl.flight.flight import Flight
-from pytest_garl.npcs.policies.stationary import POLICY as Stationary
+from pytest_garl.npcs.policies.stationary import Stationary
 from pytest_garl.scenarios.groups import EVENT_MOMENTS, EVENTS
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.fly import fly
@@ -47,10 +47,9 @@ TELLS = PolicySpec(name="tells", factory=f"{__name__}:Policy")
 
 
 @pytest.fixture(autouse=True)
-def nothing_told() -> Iterator[None]:
+def nothing_told() -> None:
     Told.at_s = inf
     Told.shown.clear()
-    yield
 
 
 def waiting(event: str) -> Scenario:
