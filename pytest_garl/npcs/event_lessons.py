@@ -180,7 +180,10 @@ class OwnEventDirector:
     def learn(self, flights: Iterable[tuple[Scenario, Flight, Outcome]]) -> EventProgress:
         """Learn from the flights of a generation; return how good it was in them before."""
         found = (lesson_of(*flown) for flown in flights)
-        new = [lesson for lesson in found if lesson is not None]
+        return self.learn_lessons([lesson for lesson in found if lesson is not None])
+
+    def learn_lessons(self, new: Sequence[EventLesson]) -> EventProgress:
+        """Learn from the lessons of a generation; return how good it was in them before."""
         expected = 0.0
         for lesson in new:
             for event, number in lesson.struck.items():

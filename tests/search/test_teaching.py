@@ -11,9 +11,10 @@ from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import save
-from pytest_garl.npcs.director_progress import Progress
+from pytest_garl.npcs.director_progress import AND_EVENTS, Progress
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.files import dump_scenario
+from pytest_garl.scenarios.groups import EVENT_MOMENTS
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.teaching import Lessons, Teacher
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
@@ -25,7 +26,8 @@ pytestmark = pytest.mark.sim
 
 @pytest.fixture(scope="module")
 def waiting() -> tuple[Scenario, Flight]:
-    scenario = chasing()
+    decided = float(EVENT_MOMENTS.index("decided"))
+    scenario = chasing().replace({"jump.after": decided, "jump.distance_m": 2.0})
     return scenario, flown(scenario)
 
 
@@ -52,4 +54,6 @@ def test_a_process_that_was_begun_anew_learns_the_same(
             learned.append((lessons.director, first, second))
             teacher.close()
     assert learned[0] == learned[1]
-    assert learned[0][0]
+    director, _, second = learned[0]
+    assert all(director.split(AND_EVENTS))
+    assert second.events.struck == 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from math import inf
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import pytest
 
@@ -52,7 +52,7 @@ def nothing_told() -> None:
     Told.shown.clear()
 
 
-def waiting(event: str) -> Scenario:
+def waiting(event: str) -> Any:
     genes = {f"{event}__{name}": value for name, value in ACTS[event].items()}
     return nominal(**{f"{event}__after": DECIDED, f"{event}__from_s": 7.0}, **genes)
 
