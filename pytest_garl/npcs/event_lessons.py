@@ -45,11 +45,11 @@ SURE = 4.0
 """The value of strike above wait by which the rule decides: a stopping probability of 98 %.  A
 smaller one would stop most landings before they come to 3 m, and nothing would be learned of later
 moments."""
-MOST_FLIGHTS = 60
-"""It learns from the latest flights, at most so many, so that a generation takes a tenth of a
+MOST_FLIGHTS = 40
+"""It learns from the latest flights, at most so many, so that a generation takes a third of a
 second."""
 MOST_STRIKES = 400
-RATE = StoppingRate(imitates=0, steps=60, learning_rate=0.05, shrinks=1e-3)
+RATE = StoppingRate(imitates=0, steps=60, learning_rate=0.02, shrinks=1e-3)
 OTHER_EVENT = 0.2
 """Weight of what followed another kind of event in the same state."""
 GUESS, GUESS_WEIGHT = 0.1, 2.0
