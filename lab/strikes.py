@@ -5,9 +5,9 @@ whose constants are off by up to 30 %, as landing systems that nobody knows.  In
 of events learns from flights, generation by generation, as in a search: half of the events strike
 as it decides, half at moments of their genes.  Then other scenarios are landed, in which events
 strike at a moment of their genes, at the start, by the fixed rule at 3 m, and as the director
-decides; and at every other moment as well, which tells how often somebody could have hit who knows
-the end.  A row per landing system, map and decider goes to ``docs/strikes.csv``; ``--report``
-prints the table.
+decides; and all at once at each second of the landing, which tells how often somebody could have
+hit who knows the end.  A row per landing system, map and decider goes to ``docs/strikes.csv``;
+``--report`` prints the table.
 """
 
 from __future__ import annotations
