@@ -58,6 +58,10 @@ class PoolError(GarlError):
     """Flying processes that cannot be started, or cannot go on."""
 
 
+class EngineError(GarlError):
+    """A physics engine that is unknown, or is not installed."""
+
+
 class DispatchError(GarlError):
     """A process whose libraries compute with other instructions than all that fly do."""
 

@@ -27,6 +27,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 REFUSED = "pybullet-arm64==3.2.8+no.wheel.for.this.machine"
 FORK = "pybullet-arm64<4,>=3.2.8"
 PYBULLET = "pybullet>=3.2.7"
+MUJOCO = "mujoco-core<5,>=4.0.1"
 
 
 @pytest.fixture(scope="module")
@@ -78,13 +79,18 @@ def test_every_command_of_the_wheel_explains_itself(built: Path, tmp_path: Path)
         ("linux", "x86_64", "3.11", PYBULLET),
         ("linux", "x86_64", "3.12", FORK),
         ("linux", "x86_64", "3.13", FORK),
-        ("linux", "aarch64", "3.11", REFUSED),
-        ("linux", "aarch64", "3.13", REFUSED),
+        ("linux", "x86_64", "3.14", MUJOCO),
+        ("linux", "aarch64", "3.11", MUJOCO),
+        ("linux", "aarch64", "3.14", MUJOCO),
+        ("linux", "riscv64", "3.13", REFUSED),
         ("darwin", "arm64", "3.11", FORK),
         ("darwin", "arm64", "3.13", FORK),
+        ("darwin", "arm64", "3.14", MUJOCO),
         ("darwin", "x86_64", "3.12", FORK),
         ("darwin", "x86_64", "3.13", REFUSED),
+        ("darwin", "x86_64", "3.14", REFUSED),
         ("win32", "AMD64", "3.11", FORK),
+        ("win32", "AMD64", "3.14", MUJOCO),
         ("win32", "ARM64", "3.13", REFUSED),
         ("freebsd14", "amd64", "3.12", REFUSED),
     ],
@@ -92,12 +98,12 @@ def test_every_command_of_the_wheel_explains_itself(built: Path, tmp_path: Path)
 def test_each_machine_gets_the_engine_that_has_a_wheel_for_it(
     system: str, machine: str, python: str, engine: str
 ) -> None:
-    """Of the wheels of pybullet 3.2.7 and pybullet-arm64 3.2.8."""
+    """Of the wheels of pybullet 3.2.7, pybullet-arm64 3.2.8 and mujoco-core 4.0.1."""
     environment = {"sys_platform": system, "platform_machine": machine, "python_version": python}
     engines = [
         f"{wanted.name}{wanted.specifier}"
         for wanted in map(Requirement, PROJECT["dependencies"])
-        if wanted.name.startswith("pybullet")
+        if wanted.name.startswith(("mujoco", "pybullet"))
         and (wanted.marker is None or wanted.marker.evaluate(environment))
     ]
     assert engines == [engine]
@@ -105,10 +111,10 @@ def test_each_machine_gets_the_engine_that_has_a_wheel_for_it(
 
 def test_pip_refuses_a_python_for_which_the_engine_has_no_wheel() -> None:
     allowed = SpecifierSet(PROJECT["requires-python"])
-    tried = ("3.10.13", "3.11.7", "3.12.1", "3.13.0", "3.14.0")
-    assert [each for each in tried if each in allowed] == ["3.11.7", "3.12.1", "3.13.0"]
+    tried = ("3.10.13", "3.11.7", "3.12.1", "3.13.0", "3.14.0", "3.15.0")
+    assert [each for each in tried if each in allowed] == [*tried[1:5]]
     named = {each.rpartition(" ")[2] for each in PROJECT["classifiers"] if ":: 3." in each}
-    assert named == {"3.11", "3.12", "3.13"}
+    assert named == {"3.11", "3.12", "3.13", "3.14"}
 
 
 def test_readme_of_the_wheel_links_to_files_of_the_repository(built: Path) -> None:

@@ -29,8 +29,8 @@ from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.physics.bullet_world import BulletWorld
 from pytest_garl.simulation.physics.npc import Npc
-from pytest_garl.simulation.physics.world import World
 
 Parts = tuple[tuple[str, Any, tuple[str, ...]], ...]
 """Name, class or module, and its functions, of each part."""
@@ -42,7 +42,11 @@ PARTS: Parts = (
     ("flight control of MM-MLS", MultiModuleLandingSystem, ("control",)),
     ("camera: depth and segments", Renderer, ("render",)),
     ("camera: images looked at", Renderer, ("_paint",)),
-    ("physics and contacts", World, ("step", "hull_contacts", "separations", "uav_state", "move")),
+    (
+        "physics and contacts",
+        BulletWorld,
+        ("step", "hull_contacts", "separations", "uav_state", "move"),
+    ),
     ("objects and their policy", Npc, ("decide", "advance")),
 )
 REST = "rest"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from pytest_garl.engine import TITLES, Engine, chosen
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.npcs.recorded import recorded_spec
 from pytest_garl.scenarios.scenario import Scenario
@@ -81,9 +82,9 @@ class CaseEvidence:
 
     ``neighbours_failed`` of ``neighbours`` slightly different scenarios failed with the same
     signature, or by the same kind of body if the entry of a crossing object was shifted;
-    ``trajectory_sha256`` is that of the flight, on CPUs of the class ``cpu``; ``removed`` says what
-    shrinking removed.  ``system_sha256`` and ``simulator_sha256`` are hashes of the sources that
-    flew it.
+    ``trajectory_sha256`` is that of the flight, by the physics engine ``engine`` on CPUs of the
+    class ``cpu``; ``removed`` says what shrinking removed.  ``system_sha256`` and
+    ``simulator_sha256`` are hashes of the sources that flew it.
     """
 
     trajectory_sha256: str
@@ -95,6 +96,7 @@ class CaseEvidence:
     versions: tuple[tuple[str, str], ...]
     system_sha256: str
     simulator_sha256: str
+    engine: Engine = "bullet"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,6 +252,17 @@ class Case:
         """What shrinking removed, in words, or that the case was not shrunk."""
         is_tried = self.evidence.removed != "nothing" or not self.severity.about
         return f"shrinking removed {self.removed}" if is_tried or self.is_shrunk else "not shrunk"
+
+    @property
+    def of_another_engine(self) -> str:
+        """That another physics engine than its own flies here, in words; empty if it is its own.
+
+        Only its own says whether a repair made the case pass, and whether it passed before.
+        """
+        own, here = self.evidence.engine, chosen()
+        if own == here:
+            return ""
+        return f"{TITLES[here]} flies here, and its reference is {TITLES[own]}'s"
 
     @property
     def asserting_test(self) -> str:

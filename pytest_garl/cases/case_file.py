@@ -30,6 +30,7 @@ from pytest_garl.cases.case_header import (
     header_lines,
     read_header,
 )
+from pytest_garl.engine import Engine
 from pytest_garl.errors import ScenarioError
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.files.bounded_files import read_text
@@ -279,6 +280,8 @@ def _evidence_lines(evidence: CaseEvidence) -> list[list[str]]:
             "[evidence]",
             f"trajectory_sha256 = {quoted(evidence.trajectory_sha256)}",
             f"cpu = {quoted(evidence.cpu)}  # class of CPUs on which the hash holds",
+            # Files that were written when there was one engine only have no such line.
+            *([] if evidence.engine == "bullet" else [f'engine = "{evidence.engine}"']),
             f"map_sha256 = {quoted(evidence.map_sha256)}",
             f"neighbours = {evidence.neighbours}  # slightly different scenarios flown",
             f"neighbours_failed = {evidence.neighbours_failed}",
@@ -295,7 +298,8 @@ def _evidence_lines(evidence: CaseEvidence) -> list[list[str]]:
 
 def _read_evidence(table: Table) -> CaseEvidence:
     hashes = {"trajectory_sha256", "map_sha256", "system_sha256", "simulator_sha256"}
-    table.refuse_unknown(hashes | {"cpu", "neighbours", "neighbours_failed", "removed", "versions"})
+    others = {"cpu", "engine", "neighbours", "neighbours_failed", "removed", "versions"}
+    table.refuse_unknown(hashes | others)
     versions = table.table("versions")
     return CaseEvidence(
         trajectory_sha256=table.string("trajectory_sha256"),
@@ -307,6 +311,7 @@ def _read_evidence(table: Table) -> CaseEvidence:
         versions=tuple((name, versions.string(name)) for name in versions.values),
         system_sha256=table.string("system_sha256"),
         simulator_sha256=table.string("simulator_sha256"),
+        engine=cast(Engine, table.string("engine", "bullet", allowed=get_args(Engine))),
     )
 
 

@@ -13,6 +13,7 @@ from pytest_garl.landing_system import Airframe
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.simulation.physics.make_world import make_world
 from pytest_garl.simulation.physics.vehicle import Quaternion, Vector, vehicle_model
 from pytest_garl.simulation.physics.world import World
 
@@ -65,7 +66,7 @@ def world_of(flight: Flight, map: Map, airframe: Airframe) -> Iterator[World]:
         for item in flight.objects
     ]
     # Nothing moves here, so the friction of the ground does not matter.
-    world = World(vehicle_model(airframe), map.uav_start_m, map.bodies, objects, 1.0)
+    world = make_world(vehicle_model(airframe), map.uav_start_m, map.bodies, objects, 1.0)
     try:
         yield world
     finally:

@@ -93,6 +93,7 @@ def new_case(
             versions=flight.versions if flight else (),
             system_sha256=job.system_sha256,
             simulator_sha256=simulator_sha256(job.simulator),
+            engine=job.engine,
         ),
         limits=job.limits,
         test=request.test or (failure.test if failure else ""),

@@ -92,6 +92,10 @@ def _order(
     map_folders: tuple[Path, ...],
     flights: Path,
 ) -> _Order:
+    if case.of_another_engine:
+        raise GarlError(
+            f"{case.of_another_engine}: renew it with garl_engine = {case.evidence.engine}"
+        )
     map = load_map(case.scenario.map, map_folders)
     system = system_of(case, _import_folder(case, collection.root))
     tests = collection.tests_of(case.system)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Literal, Self
 from pytest_garl import cpu_dispatch
 from pytest_garl.cases.case import Case, CaseEvidence
 from pytest_garl.cases.case_test_run import CaseTestResult, run_case_tests
+from pytest_garl.engine import engine_of
 from pytest_garl.errors import GarlError, LandingSystemError
 from pytest_garl.execution.exit_guard import refusing_end
 from pytest_garl.execution.fly_and_judge import time_limit_s
@@ -38,8 +40,8 @@ class Replay:
 
     ``reasons`` say why it is stale or undecided, or which test failed.  ``judged_by`` names the
     tests, or the built-in verdict.  ``same_flight`` is whether the flight equals the recorded one
-    to the byte; None if it was recorded on another class of CPUs, or if the flight's process ended
-    early; then ``flight`` may be None as well.
+    to the byte; None if it was recorded by another engine or on another class of CPUs, or if the
+    flight's process ended early; then ``flight`` may be None as well.
     """
 
     result: ReplayResult
@@ -74,7 +76,16 @@ def replay(
 
     The tests in the file of the test that found it judge; without a test, the built-in verdict.
     """
-    map = load_map(case.scenario.map, map_folders)
+    found = _replay(case, folder, load_map(case.scenario.map, map_folders), live)
+    if not case.of_another_engine:
+        return found
+    if found.result in ("FIXED", "STALE"):
+        reason = f"it passes on another engine: {case.of_another_engine}"
+        return dataclasses.replace(found, result="UNDECIDED", reasons=(reason,))
+    return dataclasses.replace(found, reasons=(*found.reasons, case.of_another_engine))
+
+
+def _replay(case: Case, folder: Path, map: Map, live: bool) -> Replay:
     if not case.test:
         judged_by = f"{BUILT_IN_VERDICT}: the case names no test"
         return _by_verdict(case, folder, map, judged_by, live)
@@ -182,6 +193,8 @@ def _excused(excuse: str) -> str:
 def _is_same(case: Case, flight: Flight | None, live: bool) -> bool | None:
     recorded = case.evidence.trajectory_sha256
     if live or flight is None or not recorded or case.evidence.cpu != flight.cpu:
+        return None
+    if engine_of(flight.versions) not in (None, case.evidence.engine):
         return None
     return flight.sha256 == recorded
 

@@ -8,11 +8,12 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, NoReturn
 
 import click
 
-from pytest_garl import cpu_dispatch
+from pytest_garl import cpu_dispatch, engine
 from pytest_garl.errors import GarlError, check_platform
 
 COMMANDS = {
@@ -32,6 +33,8 @@ COMMANDS = {
 """The subcommands, and the module of each, without ``_command``."""
 _FLIES = "check"
 """The subcommand that flies in its own process."""
+_ENGINE = {"baseline", "cases", "check", "diff", "export", "film", "train"}
+"""The subcommands for which it matters which physics engine flies."""
 _RESTARTED = "_PYTEST_GARL_RESTARTED"
 
 
@@ -94,9 +97,16 @@ def _exit(number: int, frame: object) -> NoReturn:
 
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="pytest-garl", prog_name="garl")
-def main() -> None:
+@click.pass_context
+def main(context: click.Context) -> None:
     """Prepare a search and manage its results.
 
     pytest runs the search itself: `pytest --garl-budget=40`. Run this command in the same
     folder. `garl COMMAND --help` explains a command.
     """
+    if context.invoked_subcommand in _ENGINE:
+        from pytest_garl.cli.pytest_settings import find_settings
+
+        choice = str(find_settings(Path.cwd()).values.get("garl_engine") or "")
+        if choice:
+            engine.prefer(choice)

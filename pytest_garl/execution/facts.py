@@ -19,7 +19,7 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import Database
 from pytest_garl.execution.result import Origin
 from pytest_garl.files.json_values import dataclass_from, parse_json
-from pytest_garl.npcs.director_progress import Progress
+from pytest_garl.npcs.director_progress import DirectorProgress
 
 T = TypeVar("T")
 _SESSION = "session "
@@ -29,7 +29,17 @@ _SEARCH = "search "
 _KNOWLEDGE = "knowledge of "
 _USER_FAILURES = "own failures"
 _VERSION, _SOURCES, _ARCHIVE = "version", "sources of pytest-garl", "archive"
-_REPORTED = ("seed", "budget", "method", "population", "domain", "npcs", "python", "archive")
+_REPORTED = (
+    "seed",
+    "budget",
+    "method",
+    "population",
+    "domain",
+    "npcs",
+    "engine",
+    "python",
+    "archive",
+)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True, order=True)
@@ -98,6 +108,7 @@ class Facts:
         version: str,
         package_sha256: str,
         python: str,
+        engine: str,
         seed: int,
         budget: int | None,
         method: str | None,
@@ -108,8 +119,8 @@ class Facts:
         archive: str | None,
     ) -> dict[str, Any]:
         """Return what must be equal when a run is resumed."""
-        named = {_VERSION: version, _SOURCES: package_sha256, "python": python, "seed": seed}
-        wanted = {"budget": budget, "method": method, "population": population}
+        named = {_VERSION: version, _SOURCES: package_sha256, "python": python, "engine": engine}
+        wanted = {"seed": seed, "budget": budget, "method": method, "population": population}
         places = {"map": map, "domain": domain, "npcs": npcs}
         return {**named, **wanted, **places, _ARCHIVE: archive}
 
@@ -269,22 +280,22 @@ class Facts:
         return [self._typed(Origin, key, each) for each in self._get(key) or ()]
 
     def note_director(self, search: str, generation: int, director: str) -> None:
-        """Note the weights that decide in a generation when NPCs begin and events strike."""
+        """Note the weights that decide in the flights of a generation when NPCs begin."""
         self._first(_director(search, generation), director)
 
     def director(self, search: str, generation: int) -> str:
         """Return what decides in the flights of a generation; empty for the weights that ship."""
         return self._text(_director(search, generation)) or ""
 
-    def note_progress(self, search: str, generation: int, progress: Progress) -> None:
-        """Note what a generation says of the directors with which it was flown."""
+    def note_progress(self, search: str, generation: int, progress: DirectorProgress) -> None:
+        """Note what a generation says of the director with which it was flown."""
         self._first(_progress(search, generation), dataclasses.asdict(progress))
 
-    def progress(self, search: str, generation: int) -> Progress | None:
-        """Return what a generation says of its directors; None if nothing learned from it."""
+    def progress(self, search: str, generation: int) -> DirectorProgress | None:
+        """Return what a generation says of its director; None if nothing learned from it."""
         key = _progress(search, generation)
         found = self._get(key)
-        return None if found is None else self._typed(Progress, key, found)
+        return None if found is None else self._typed(DirectorProgress, key, found)
 
     def note_user_failures(self, failures: Iterable[FailedFlightAssertion]) -> None:
         """Note the failed assertions about users' own properties."""

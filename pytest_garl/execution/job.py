@@ -6,9 +6,10 @@ import dataclasses
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from pytest_garl.engine import Engine, chosen
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import REMEDY
 from pytest_garl.execution.flight_id import FlightId
@@ -35,6 +36,7 @@ class FlightJob:
     that imports search, ``flights`` is the folder of the flights' records.  ``sources`` are the
     parts of the landing system by name and hash, of which ``system_sha256`` is the combined hash.
     ``takeover`` lets another pilot take over from the landing system during the flight.
+    ``engine`` is the physics engine, that of the process which made the job.
     """
 
     system: Reference
@@ -50,6 +52,7 @@ class FlightJob:
     flights: str
     sources: tuple[tuple[str, str], ...] = ()
     takeover: Takeover | None = None
+    engine: Engine = field(default_factory=chosen)
 
     @classmethod
     def for_system(

@@ -35,7 +35,10 @@ FLYING = (
     "verdicts.judge",
 )
 """Modules that a flight imports; they import the rest."""
-SHARED = {"cv2", "json", "math", "numpy", "os", "pathlib", "pybullet", "random", "struct", "time"}
+SHARED = {
+    *("cv2", "json", "math", "mujoco", "numpy", "os", "pathlib", "pybullet"),
+    *("random", "struct", "time"),
+}
 """Foreign packages with which the simulator computes."""
 MAX_LEFT_THREADS = 8
 MAX_LEFT_FILES = 64

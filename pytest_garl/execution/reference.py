@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pytest_garl.engine import chosen
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution.sources import code_sha256, flight_code_sha256
 from pytest_garl.messages import shown
@@ -28,6 +29,7 @@ HASHED = (
     "companion",
     "cpu_dispatch.py",
     "distortion.py",
+    "engine.py",
     "execution",
     "external",
     "fiducial.py",
@@ -135,10 +137,12 @@ def package_sha256() -> str:
 def simulator_sha256(simulator: Reference) -> str:
     """Return the hash of the code that flies and judges a case, except the landing system.
 
-    A simulator of the project's own is part of it.
+    A simulator of the project's own is part of it, and so is the physics engine.
     """
     own = code_sha256(Path(simulator.file)) if simulator.file else ""
-    return hashlib.sha256(f"{flight_code_sha256()}{own}".encode()).hexdigest()
+    # Cases that were saved when there was one engine only have this hash.
+    engine = "" if chosen() == "bullet" else chosen()
+    return hashlib.sha256(f"{flight_code_sha256()}{own}{engine}".encode()).hexdigest()
 
 
 def system_named(name: str) -> Any:

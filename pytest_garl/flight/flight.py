@@ -21,15 +21,13 @@ TRACK_RATE_HZ = 24.0
 """Rate of the recorded tracks: every tenth physics step."""
 OBSERVED = ("image", "depth_m", "rangefinder_m")
 """The fields of an observation of which a flight records whether they were read."""
-PACKAGES = ("pytest-garl", "numpy", "opencv-python-headless", "pybullet")
-"""Packages whose versions determine the bytes of a flight."""
-_SAME_ENGINE = {"pybullet": ("pybullet", "pybullet-arm64")}
-"""The engine is the first of these that is installed; for most machines one has no wheel."""
+_DISTRIBUTIONS = {"pybullet": ("pybullet", "pybullet-arm64"), "mujoco": ("mujoco-core", "mujoco")}
+"""An engine is in the first of these that is installed; for most machines one has no wheel."""
 
 
 def version_of(package: str) -> str:
     """Return the version of an installed package, or "absent"."""
-    for name in _SAME_ENGINE.get(package, (package,)):
+    for name in _DISTRIBUTIONS.get(package, (package,)):
         try:
             return version(name)
         except PackageNotFoundError:

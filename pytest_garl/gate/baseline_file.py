@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.cases.case_file import read_limits
+from pytest_garl.engine import Engine, engine_of
 from pytest_garl.errors import BaselineError, GarlError, ScenarioError
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.files.bounded_files import MEGABYTE, read_text
@@ -100,6 +101,11 @@ class Baseline:
     cpu: str
     versions: tuple[tuple[str, str], ...]
     sets: tuple[BaselineSet, ...]
+
+    @property
+    def engine(self) -> Engine:
+        """The physics engine that flew it."""
+        return engine_of(self.versions) or "bullet"
 
     def find(self, system: str, map: str) -> BaselineSet | None:
         """Return the set of a system on a map, if there is one."""

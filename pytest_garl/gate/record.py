@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from pytest_garl.engine import Engine, chosen, packages
 from pytest_garl.errors import BaselineError, PolicyError
 from pytest_garl.execution.checkout import Checkout, locate_system
 from pytest_garl.execution.flight_id import CompletedFlight
@@ -74,7 +75,7 @@ def fly_baseline(
             title = f"{checkout.folder}: {reference.qualname} on {map.name}"
             flights = show_progress(fly_all(ledger, pool, job, scenarios), title, len(scenarios))
             sets.append(_baseline_set(job, zip(scenarios, flights, strict=True), "random"))
-    return _baseline(sets)
+    return _baseline(sets, chosen())
 
 
 def neighbour_flyer(
@@ -135,7 +136,7 @@ def baseline_from_ledger(path: Path) -> Baseline:
             sets.append(_baseline_set(job, flights, method))
     if not sets:
         raise BaselineError(f"{path}: no search has flown anything yet")
-    return _baseline(sets)
+    return _baseline(sets, searches[0][0].engine)
 
 
 def _check_npcs(path: Path, npcs: PolicySpec) -> None:
@@ -170,12 +171,12 @@ def _baseline_set(
     )
 
 
-def _baseline(sets: Sequence[BaselineSet]) -> Baseline:
+def _baseline(sets: Sequence[BaselineSet], engine: Engine) -> Baseline:
     from pytest_garl.cpu_dispatch import cpu_class_of_flights
-    from pytest_garl.flight.flight import PACKAGES, version_of
+    from pytest_garl.flight.flight import version_of
 
     return Baseline(
         cpu=cpu_class_of_flights(),
-        versions=tuple((name, version_of(name)) for name in PACKAGES),
+        versions=tuple((name, version_of(name)) for name in packages(engine)),
         sets=tuple(sets),
     )

@@ -29,9 +29,10 @@ from pytest_garl.simulation.camera.meshes import rotation_matrix
 from pytest_garl.simulation.camera.true_camera import mount_of
 from pytest_garl.simulation.landing_moments import LandingMoments
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Situation
+from pytest_garl.simulation.physics.make_world import make_world
 from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.vehicle import vehicle_model
-from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
+from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
 
 FRAME_S = 0.1
 """A body is seen if it is in the picture now and was one frame of the default camera before."""
@@ -161,7 +162,7 @@ class Passage:
         placed = Placed(scenario, map)
         self._marker_m, self._kind = placed.marker_m, placed.npc(name).type
         body = Npc(placed, name, policy()).body
-        self._world = World(vehicle_model(airframe), map.uav_start_m, (), [body], 1.0)
+        self._world = make_world(vehicle_model(airframe), map.uav_start_m, (), [body], 1.0)
         self._reach_m = airframe.size_m / 2 + self._kind.radius_m + _NEAR_M
         self._last = math.floor(float(uav.time_s[-1]) * PHYSICS_RATE_HZ / TICKS_PER_NPC_STEP)
         times = np.arange(self._last + 1) * TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ

@@ -139,8 +139,7 @@ OPTIONS = (
         name="npcs",
         metavar="POLICY",
         help=f"NPC policy, which moves people, dogs and birds: {', '.join(policy_names())}, or "
-        "weights (.npz) that `garl train` wrote (default: as the domain says, graded with its "
-        "learned director where NPCs may interfere; in the domain paper "
+        f"weights (.npz) that `garl train` wrote (default: as the domain says; in the domain paper "
         f"{DEFAULT_POLICY}, and the methods of the paper have their own, see docs/methods.md; with "
         "--garl-repeat the policy of the search).",
     ),
@@ -187,6 +186,12 @@ def add_options(parser: pytest.Parser) -> None:
         "garl_unasserted",
         help="What a violation is that no selected test asserts: 'fail' fails the run, 'note' is a "
         "line of the summary (default: fail where the environment variable CI is set, else note).",
+        default="",
+    )
+    parser.addini(
+        "garl_engine",
+        help="The physics engine: 'bullet', 'mujoco', or 'auto': bullet if it is installed, else "
+        "mujoco (default: what the environment variable GARL_ENGINE says, else auto).",
         default="",
     )
     parser.addini(

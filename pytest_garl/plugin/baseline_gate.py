@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 
 import pytest
 
+from pytest_garl.engine import chosen
 from pytest_garl.errors import GarlError
 from pytest_garl.gate.baseline_file import Baseline, BaselineSet, load_baseline
 from pytest_garl.gate.comparison import Comparison
@@ -32,9 +33,16 @@ def register(config: pytest.Config, options: Options) -> None:
     """Add the gate to a session; raise UsageError if the file is no baseline."""
     assert options.baseline is not None
     try:
-        baseline = load_baseline(options.baseline, options.map_folders)
+        baseline, engine = load_baseline(options.baseline, options.map_folders), chosen()
     except GarlError as error:
         raise pytest.UsageError(f"--garl-baseline: {error}") from error
+    if baseline.engine != engine:
+        raise pytest.UsageError(
+            f"--garl-baseline={options.baseline}: found a baseline of the physics engine "
+            f"{baseline.engine}, expected one of {engine}, which flies here: results of two "
+            f"engines are no fair comparison. Set garl_engine = {baseline.engine}, or save a "
+            "baseline here with `garl baseline save`"
+        )
     config.pluginmanager.register(
         BaselineGatePlugin(options, options.baseline, baseline), GATE_PLUGIN
     )

@@ -8,6 +8,7 @@ import pytest
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.cases.forecast import flight_times_with_shrinking, seconds_per_new_signature
+from pytest_garl.engine import chosen
 from pytest_garl.files.run_files import RUN_FOLDER, SEARCH_LEDGER
 from pytest_garl.messages import command
 from pytest_garl.plugin.run import Run
@@ -105,7 +106,8 @@ def _search_line(run: Run) -> str:
     return (
         f"garl: {resuming}budget {options.budget} per system and map, method {options.method}, "
         f"seed {options.seed}, NPCs {options.policy_in(options.domain)}, "
-        f"domain {options.domain.name}{_archive(run)}, {_workers(run)}"
+        f"domain {options.domain.name}{_archive(run)}, engine {chosen()}, "
+        f"{_workers(run)}"
     )
 
 

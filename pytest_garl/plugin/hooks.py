@@ -81,6 +81,10 @@ def pytest_configure(config: pytest.Config) -> None:
         "compares.",
     )
     check_keys(config)
+    if config.getini("garl_engine"):
+        from pytest_garl import engine
+
+        engine.prefer(config.getini("garl_engine"))
     if not is_xdist_worker(config):
         config.stash[TALLY] = Tally()
         config.pluginmanager.register(config.stash[TALLY], "garl_tally")

@@ -61,6 +61,7 @@ def case_state(run: Run, target: Target) -> CaseState | None:
         status=entry.case.status,
         reason=entry.case.reason,
         accepted=run.corpus.is_accepted(entry),
+        of_another_engine=entry.case.of_another_engine,
     )
 
 

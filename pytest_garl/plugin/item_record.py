@@ -82,6 +82,8 @@ class ItemRecord:
     """The file of an open case that passes."""
     stale: str = ""
     """The file of an open case that passes without proof, and why."""
+    passes_elsewhere: str = ""
+    """The file of an open case that passes on another physics engine than its own, and on which."""
 
     # Of items that are no tests: a gate, probes, or a file that is lost.
     found: str = ""

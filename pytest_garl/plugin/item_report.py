@@ -133,6 +133,9 @@ class _Writer:
             ItemRecord(stale=f"{file} passes, but {unproven}").add_to(self.report)
         elif decision.reason is Reason.MAYBE_FIXED:
             ItemRecord(maybe_fixed=file).add_to(self.report)
+        elif decision.reason is Reason.OTHER_ENGINE:
+            text = f"{file}: {facts.case.of_another_engine}"
+            ItemRecord(passes_elsewhere=text).add_to(self.report)
         if decision.outcome == "failed":
             self.report.outcome = "failed"
             self.report.longrepr = report_text.passing_failure(decision, file, unproven)

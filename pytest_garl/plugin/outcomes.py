@@ -43,6 +43,7 @@ class Reason(Enum):
     PASSES = "the test passes"
     MAYBE_FIXED = "the case is open and passes"
     STALE = "the case is open and passes, which proves nothing"
+    OTHER_ENGINE = "the case is another physics engine's, which alone says how it passes and fails"
 
 
 class Need(Enum):
@@ -86,6 +87,8 @@ class CaseState:
     """Why it gates nothing; empty for a case that gates."""
     accepted: bool = False
     """Whether the case is known: committed, or accepted by a user."""
+    of_another_engine: str = ""
+    """That another physics engine than its own flies here, in words."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,6 +229,8 @@ def _failed_case(facts: FailedItem, case: CaseState) -> Decision:
         return _xfail(Reason.EXPECTED)
     if open_as_saved or not_preventable:
         return _fail(Reason.NEW_CASE)
+    if case.of_another_engine and not (facts.user_property or facts.crashed):
+        return _xfail(Reason.OTHER_ENGINE)
     return _fail(Reason.FAILS_AGAIN if case.status == "fixed" else Reason.FAILS_DIFFERENTLY)
 
 
@@ -236,6 +241,8 @@ def _passed_case(facts: PassedCase) -> Decision | Need:
         return _xfail(Reason.EDGE)
     if case.status != "open" or case.reason or facts.violates:
         return Decision(outcome="passed", reason=Reason.PASSES)
+    if case.of_another_engine:
+        return Decision(outcome="passed", reason=Reason.OTHER_ENGINE)
     reason = Reason.STALE if facts.unproven else Reason.MAYBE_FIXED
     if facts.strict:
         if facts.first is None:

@@ -18,6 +18,7 @@ import pytest
 from pytest_garl.cases.case_request import CaseRequest
 from pytest_garl.cases.corpus import Corpus
 from pytest_garl.cases.new_signatures import request_of
+from pytest_garl.engine import chosen
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import FIRST_SLOT, CompletedFlight, search_key
 from pytest_garl.execution.job import parse_job
@@ -287,7 +288,9 @@ def _causes(scenario: Scenario) -> set[str]:
 def _key(options: Options, target: Target) -> str:
     """Return what stands for a landing system, its task and its present sources."""
     sources = source_hashes(target.system, data_files(target.files, options.root))
-    return search_key(json.dumps([target.search, combined_sha256(sources), package_sha256()]))
+    return search_key(
+        json.dumps([target.search, combined_sha256(sources), package_sha256(), chosen()])
+    )
 
 
 def passed_before(ledger: Ledger | None, folder: Path) -> list[str]:

@@ -51,6 +51,10 @@ def expected_failure(decision: Decision, facts: FailedItem, file: str) -> str:
             return f"did not repeat: {_share(facts.reflights)} ({facts.signature})"
         case Reason.EDGE:
             return f"edge: fails; {saved} ({file})"
+        case Reason.OTHER_ENGINE:
+            assert facts.case is not None
+            why = facts.case.of_another_engine
+            return f"another engine: fails by {facts.signature} ({file}; {why})"
         case Reason.NOT_PREVENTABLE_CASE:
             assert facts.case is not None
             return f"{facts.case.reason}: {saved} ({file})"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import pytest
 
+from pytest_garl.engine import chosen
 from pytest_garl.errors import GarlError, LedgerError
 from pytest_garl.execution.facts import Facts
 from pytest_garl.execution.ledger import Ledger
@@ -39,7 +40,9 @@ def begin_run(config: pytest.Config, options: Options) -> None:
     The first process alone makes the ledger.  Raises UsageError if nothing can be flown.
     """
     try:
-        # Weights that cannot be trusted, or no Ray, end the session before there is a ledger.
+        # No physics engine, or weights that cannot be trusted, or no Ray, end the session before
+        # there is a ledger.
+        chosen()
         policy_spec(options.policy_in(options.domain))
         if options.pool == "ray":
             check_ray(options.ray_address)
@@ -136,6 +139,7 @@ def _facts(options: Options, archive: str | None = None) -> dict[str, Any]:
         version=version("pytest-garl"),
         package_sha256=package_sha256()[:12],
         python=sys.version.split()[0],
+        engine=chosen(),
         seed=options.seed,
         budget=options.budget,
         # A scenario that is flown again belongs to no search.

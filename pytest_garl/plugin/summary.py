@@ -98,6 +98,7 @@ def _passing_cases(reporter: Any) -> list[str]:
     passing = [*records(reporter, "passed")]
     fixed = {each.maybe_fixed for each in passing} - {"", *failing}
     stale = {each.stale for each in passing} - {""}
+    elsewhere = {each.passes_elsewhere for each in passing} - {""}
     promote = {file: command("garl", "cases", "promote", file) for file in sorted(fixed)}
     return [
         *(
@@ -105,6 +106,7 @@ def _passing_cases(reporter: Any) -> list[str]:
             for file, text in promote.items()
         ),
         *(f"stale: {text}" for text in sorted(stale)),
+        *(f"passes on another engine: {text}" for text in sorted(elsewhere)),
     ]
 
 

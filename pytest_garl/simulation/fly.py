@@ -9,7 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 from pytest_garl.cpu_dispatch import dispatched
-from pytest_garl.flight.flight import PACKAGES, Flight, version_of
+from pytest_garl.engine import packages
+from pytest_garl.flight.flight import Flight, version_of
 from pytest_garl.flight.flight_file import hash_of
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.maps.loading import load_map
@@ -39,17 +40,17 @@ def fly(
     """
     began = time.perf_counter()
     placed = Placed(scenario, map or load_map(scenario.map))
-    loop = Loop(placed, system, npcs.make, time_limit_s, guard, npcs.event_director())
+    loop = Loop(placed, system, npcs.make, time_limit_s, guard)
     flight = dataclasses.replace(
         with_nominal_landing(loop.run(), placed, loop.camera),
         conditions=tuple(each.cause for each in active_conditions(scenario)),
         cpu=dispatched(),
-        versions=_versions(),
+        versions=_versions(packages()),
         wall_s=time.perf_counter() - began,
     )
     return dataclasses.replace(flight, sha256=hash_of(flight))
 
 
 @functools.cache
-def _versions() -> tuple[tuple[str, str], ...]:
-    return tuple((name, version_of(name)) for name in PACKAGES)
+def _versions(names: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    return tuple((name, version_of(name)) for name in names)

@@ -6,7 +6,8 @@ from importlib.metadata import PackageNotFoundError
 
 import pytest
 
-from pytest_garl.flight.flight import PACKAGES, version_of
+from pytest_garl.engine import chosen, engine_of, packages
+from pytest_garl.flight.flight import version_of
 
 
 @pytest.mark.parametrize(
@@ -31,4 +32,5 @@ def test_engine_is_found_under_either_name(
 
 
 def test_packages_of_a_flight_are_installed() -> None:
-    assert "absent" not in [version_of(name) for name in PACKAGES]
+    assert "absent" not in [version_of(name) for name in packages()]
+    assert engine_of(tuple((name, "1") for name in packages())) == chosen()

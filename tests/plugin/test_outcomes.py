@@ -39,13 +39,21 @@ def failed(
     status: Status = "open", *, reason: NoGateReason = "", accepted: bool = True, **facts: Any
 ) -> Any:
     """Return facts about a test that failed on a saved case."""
-    case = CaseState(signature=DOG, status=status, reason=reason, accepted=accepted)
+    elsewhere = facts.pop("of_another_engine", "")
+    case = CaseState(
+        signature=DOG,
+        status=status,
+        reason=reason,
+        accepted=accepted,
+        of_another_engine=elsewhere,
+    )
     return found(case=case, **facts)
 
 
 def passed(status: Status = "open", *, reason: NoGateReason = "", **facts: Any) -> PassedCase:
     """Return facts about a test that passed on a saved case."""
-    case = CaseState(signature=DOG, status=status, reason=reason)
+    elsewhere = facts.pop("of_another_engine", "")
+    case = CaseState(signature=DOG, status=status, reason=reason, of_another_engine=elsewhere)
     rest: dict[str, Any] = {"violates": False} | facts
     return PassedCase(case=case, **rest)
 
@@ -110,6 +118,17 @@ def test_search_item_fails_once_per_repeating_violation(
         ),
         # Another known case excuses a property of the user's own, and nothing else.
         (failed(signature=PERSON, expected_by="person.toml"), "failed", None),
+        # On another engine a case says nothing but that it fails as saved, and crashes count.
+        (failed(of_another_engine="mujoco"), "xfailed", Reason.KNOWN_CASE),
+        (failed(accepted=False, of_another_engine="mujoco"), "failed", Reason.NEW_CASE),
+        (failed(signature=PERSON, of_another_engine="mujoco"), "xfailed", Reason.OTHER_ENGINE),
+        (failed("fixed", of_another_engine="mujoco"), "xfailed", Reason.OTHER_ENGINE),
+        (
+            failed(signature="V:ValueError", crashed=True, of_another_engine="mujoco"),
+            "failed",
+            None,
+        ),
+        (failed(signature=OWN, user_property=True, of_another_engine="mujoco"), "failed", None),
         (failed(inconclusive=True), "failed", Reason.INCONCLUSIVE),
         (failed(signature=""), "failed", Reason.TEST_ERROR),
     ],
@@ -136,6 +155,9 @@ def test_failing_case_is_expected_only_as_known(
         (passed("fixed", strict=True), "passed", Reason.PASSES),
         (passed(reason="edge", strict=True), "xfailed", Reason.EDGE),
         (passed(reason="sensor-limited", strict=True), "passed", Reason.PASSES),
+        (passed(of_another_engine="mujoco"), "passed", Reason.OTHER_ENGINE),
+        (passed(strict=True, of_another_engine="mujoco"), "passed", Reason.OTHER_ENGINE),
+        (passed(reason="edge", of_another_engine="mujoco"), "xfailed", Reason.EDGE),
     ],
 )
 def test_passing_case_fails_only_if_strict(facts: Facts, outcome: Outcome, reason: Reason) -> None:

@@ -15,7 +15,11 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.placed import start_genes
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S
+from tests.support.engines import engine
 from tests.support.flights import EMPTY, LAWN, STAND, Falls, HitsATree, Scripted, nominal
+
+__all__ = ["engine"]
+pytestmark = pytest.mark.usefixtures("engine")
 
 DOG = dataclasses.replace(LAWN, objects=(("dog", 1),))
 LANDS_AT_S = 4.0

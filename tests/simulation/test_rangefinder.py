@@ -14,12 +14,14 @@ from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M
 from pytest_garl.scenarios.bodies import Body, Part
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.physics.flight_control import MAX_TILT_RAD
+from pytest_garl.simulation.physics.make_world import make_world
 from pytest_garl.simulation.physics.vehicle import Motion, vehicle_model
-from pytest_garl.simulation.physics.world import World
 from pytest_garl.simulation.rangefinder import NOISE_M, Ranging
+from tests.support.engines import engine
 from tests.support.flights import EMPTY, STAND, Scripted, nominal
 
-pytestmark = pytest.mark.sim
+__all__ = ["engine"]
+pytestmark = [pytest.mark.sim, pytest.mark.usefixtures("engine")]
 
 UAV = vehicle_model(Airframe())
 LEVEL = (0.0, 0.0, 0.0, 1.0)
@@ -37,7 +39,7 @@ def reading_m(
     rangefinder: Rangefinder | None = None,
 ) -> float | None:
     """Return what the rangefinder says of a place above the ground and a box."""
-    world = World(UAV, (0.0, 0.0, 0.0), (BOX,), (), 1.0)
+    world = make_world(UAV, (0.0, 0.0, 0.0), (BOX,), (), 1.0)
     try:
         world.place_uav(place, attitude)
         ranging = Ranging(nominal(), rangefinder or Rangefinder(), world)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pytest_garl import Airframe, VehicleState
 from pytest_garl.scenarios.bodies import rotate
+from pytest_garl.simulation.physics.make_world import make_world
 from pytest_garl.simulation.physics.vehicle import (
     FEET_FRICTION,
     Thrusts,
@@ -19,7 +20,7 @@ from pytest_garl.simulation.physics.vehicle import (
     vehicle_model,
     wrench,
 )
-from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
+from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
 from pytest_garl.vehicle import ArduPilotControl, ArduPilotParameters
 
 Orders = Callable[[float, Any], None]
@@ -71,7 +72,7 @@ def fly_bare(
     airframe = Airframe(control_rate_hz=control_rate_hz)
     control: Any = make(airframe) if make else ArduPilotControl(airframe, parameters)
     model = vehicle_model(airframe)
-    world = World(model, (0.0, 0.0, 0.0), [], [], FEET_FRICTION["concrete"])
+    world = make_world(model, (0.0, 0.0, 0.0), [], [], FEET_FRICTION["concrete"])
     every = round(PHYSICS_RATE_HZ / control_rate_hz)
     if start_m:
         world.place_uav((0.0, 0.0, start_m), (0.0, 0.0, 0.0, 1.0))

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl import cpu_dispatch
+from pytest_garl.engine import packages
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
@@ -23,7 +24,7 @@ from pytest_garl.execution.reference import Reference, package_sha256
 from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.files.json_values import parse_json
-from pytest_garl.flight.flight import PACKAGES, Crash, version_of
+from pytest_garl.flight.flight import Crash, version_of
 
 _PLACEHOLDER_RESULT = broken_result(Crash(kind="died", error="", message=""), diagonal_m=0.0)
 """The entry in the actor's own ledger for a flight whose worker ended; nothing reads it."""
@@ -171,5 +172,5 @@ def versions() -> dict[str, str]:
     return {
         "sources of pytest-garl": package_sha256()[:12],
         "CPU dispatch": cpu_dispatch.expected(),
-        **{name: version_of(name) for name in PACKAGES},
+        **{name: version_of(name) for name in packages()},
     }

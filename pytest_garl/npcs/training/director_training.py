@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import itertools
-import platform
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -18,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.flight.flight import version_of
 from pytest_garl.npcs.director import WAITING, Director, LearnedDirector, TimeToGo
 from pytest_garl.npcs.gradient import (
     Decisions,
@@ -41,11 +39,11 @@ from pytest_garl.npcs.training.dqn import Learner, one_thread
 from pytest_garl.npcs.training.presets import Surrogate, Training
 from pytest_garl.npcs.training.selection import (
     CHOICE_SEEDS_FROM,
-    PACKAGES,
     REPORT_SEEDS_FROM,
     MomentScore,
     TrainingPlan,
     TrainingResult,
+    versions,
 )
 
 HIDDEN = (24, 24)
@@ -215,8 +213,5 @@ def _manifest(
         "validation": {str(seed): dataclasses.asdict(score) for seed, score in scores.items()},
         "other_episodes": dataclasses.asdict(report),
         "sources": sources_sha256(),
-        "versions": {
-            "python": platform.python_version(),
-            **{name: version_of(name) for name in PACKAGES},
-        },
+        "versions": versions(),
     }

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pytest_garl.engine import packages
 from pytest_garl.flight.flight import version_of
 from pytest_garl.npcs.learned import Network, save
 from pytest_garl.npcs.training.checkpoint import identity_of, sources_sha256
@@ -22,7 +23,6 @@ from pytest_garl.npcs.training.presets import Surrogate, Training
 from pytest_garl.npcs.training.surrogate import env_of
 from pytest_garl.npcs.training.train import train
 
-PACKAGES = ("pytest-garl", "numpy", "torch", "gymnasium", "pybullet")
 CHOICE_SEEDS_FROM = 2_000_000_000
 """First seed of the episodes that choose between trainings; seeds in training are hashes."""
 REPORT_SEEDS_FROM = 3_000_000_000
@@ -189,11 +189,14 @@ def _manifest(
         "validation": {str(seed): dataclasses.asdict(score) for seed, score in scores.items()},
         "other_episodes": dataclasses.asdict(report),
         "sources": sources_sha256(),
-        "versions": {
-            "python": platform.python_version(),
-            **{name: version_of(name) for name in PACKAGES},
-        },
+        "versions": versions(),
     }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of all that trains and flies."""
+    names = sorted({*packages(), "torch", "gymnasium"} - {"opencv-python-headless"})
+    return {"python": platform.python_version(), **{name: version_of(name) for name in names}}
 
 
 def draw_curves(curves: Mapping[int, Sequence[EpisodeRecord]], path: Path) -> None:

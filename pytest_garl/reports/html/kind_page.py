@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from pytest_garl.cases.case import NO_GATE_TEXTS, Case
 from pytest_garl.cases.story_text import grade_in_words
+from pytest_garl.engine import engine_of
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.messages import command, shortened
 from pytest_garl.reports.html.flight_tables import cut_text
@@ -272,6 +273,7 @@ def _origin(plan: KindPlan, flight: ShownFlight) -> tuple[Fact, ...]:
         ("NPC policy", plan.task.policy),
         ("trajectory, SHA-256", flight.sha256),
         ("CPU class", flight.cpu),
+        ("physics engine", engine_of(flight.versions) or ""),
         *flight.versions,
     ]
     return tuple((name, value) for name, value in rows if value)

@@ -1,51 +1,31 @@
-"""The physics of one flight, the only module that imports pybullet."""
+"""The physics of one flight: what an engine must do, and the shapes and figures that engines share.
+
+``bullet_world.py`` and ``mujoco_world.py`` do it, each the only module that imports its engine;
+``make_world.py`` takes the one that was chosen.
+"""
 
 from __future__ import annotations
 
-import contextlib
 import math
-import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
-from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, GRAVITY_MPS2
-from pytest_garl.scenarios.bodies import Body
-from pytest_garl.simulation.physics.vehicle import Quaternion, Vector, VehicleModel
-
-
-@contextlib.contextmanager
-def _without_stderr() -> Iterator[None]:
-    """Redirect stderr to nothing: pybullet's C code prints its build time on import."""
-    saved = os.dup(2)
-    null = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(null, 2)
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(null)
-
-
-with _without_stderr():
-    import pybullet
+from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M
+from pytest_garl.scenarios.bodies import Body, Part
+from pytest_garl.simulation.physics.vehicle import Quaternion, Vector
 
 PHYSICS_RATE_HZ = 240
-_GEOMETRIES = {
-    "box": "GEOM_BOX",
-    "cylinder": "GEOM_CYLINDER",
-    "sphere": "GEOM_SPHERE",
-    "ellipsoid": "GEOM_MESH",
-}
-_BALL_FILE = str(Path(__file__).with_name("unit_ball.obj"))
-"""Vertices of a ball of diameter 1 as the camera draws it: 10 sides, 5 rings; the engine
-uses their convex hull."""
-_EXACT_RANGE_M = 3.0
-"""The engine computes distances up to this one; longer ones are those of bounding spheres."""
-
-_PAST_HULL_M = 0.005
-"""Step with which a ray leaves the UAV's own hull."""
+EXACT_RANGE_M = 3.0
+"""An engine computes distances up to this one; longer ones are those of bounding spheres."""
+BODY_FRICTION = 0.5
+"""Coefficient of friction between the hull and a body other than the ground: Bullet's default.  A
+contact with a body that stands there ends a flight, so it decides little."""
+BALL_FILE = Path(__file__).with_name("unit_ball.obj")
+"""Vertices of a ball of diameter 1 as the camera draws it: 10 sides, 5 rings; engines use their
+convex hull for ellipsoids, so that what can be hit is what can be seen."""
+_DISC_M = 0.10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,200 +36,82 @@ class HullContact:
     position_m: Vector
 
 
-class World:
+class World(Protocol):
     """One flight's physics: ground, static bodies, dynamic objects and the UAV's hull.
 
-    A world is built for one flight and closed after it: restoring a saved pybullet state is
-    not deterministic, but building a new world is.
+    A world is built for one flight and closed after it, so that equal flights begin with equal
+    bytes.
     """
 
-    def __init__(
-        self,
-        model: VehicleModel,
-        start_m: Vector,
-        bodies: Sequence[Body],
-        objects: Sequence[Body],
-        ground_friction: float,
-    ) -> None:
-        self._client = pybullet.connect(pybullet.DIRECT)
-        self._client_argument = {"physicsClientId": self._client}
-        pybullet.setGravity(0, 0, -GRAVITY_MPS2, **self._client_argument)
-        pybullet.setTimeStep(1 / PHYSICS_RATE_HZ, **self._client_argument)
-        pybullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, **self._client_argument)
-        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, **self._client_argument)
-        ground = pybullet.createMultiBody(0, plane, **self._client_argument)
-        # The engine multiplies the friction of the two bodies, and that of the hull is 1.
-        pybullet.changeDynamics(
-            ground, -1, lateralFriction=ground_friction, **self._client_argument
-        )
-        self._ground = ground
-        # Nobody sees it. A body without one gets triangles of all its parts, which takes 40 % of
-        # the time to build a world.
-        self._looks = pybullet.createVisualShape(
-            pybullet.GEOM_BOX, halfExtents=[0.01, 0.01, 0.01], **self._client_argument
-        )
-        self._names = {ground: "ground"}
-        self._spheres: dict[int, tuple[Vector, float]] = {}
-        self._ids: dict[str, int] = {}
-        for body in (*bodies, *objects):
-            self._add(body)
-        self._uav = self._add_uav(model, start_m)
-        self._hull_radius_m = model.size_m * 0.6
-
     def close(self) -> None:
-        """Free the physics client."""
-        pybullet.disconnect(**self._client_argument)
+        """Free what the engine holds."""
 
     def step(self, position: Vector, force: Vector, torque: Vector) -> None:
         """Apply a force and a torque to the UAV at ``position`` and advance by 1/240 s.
 
         All three are in the world frame.
         """
-        client, uav = self._client, self._uav
-        pybullet.applyExternalForce(uav, -1, force, position, pybullet.WORLD_FRAME, client)
-        pybullet.applyExternalTorque(uav, -1, torque, pybullet.WORLD_FRAME, client)
-        pybullet.stepSimulation(client)
 
     def uav_state(self) -> tuple[Vector, Quaternion, Vector, Vector]:
         """Position, attitude, velocity and angular velocity of the UAV, in the world frame."""
-        position, attitude = pybullet.getBasePositionAndOrientation(self._uav, self._client)
-        velocity, spin = pybullet.getBaseVelocity(self._uav, self._client)
-        return position, attitude, velocity, spin
 
     def move(self, name: str, position_m: Vector, yaw_rad: float, velocity: Vector) -> None:
-        """Move a dynamic object to a pose; contacts depend on its velocity too."""
-        body = self._ids[name]
-        attitude = (0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2))
-        pybullet.resetBasePositionAndOrientation(
-            body, position_m, attitude, **self._client_argument
-        )
-        pybullet.resetBaseVelocity(body, velocity, (0, 0, 0), **self._client_argument)
-        self._spheres[body] = (position_m, self._spheres[body][1])
+        """Move a dynamic object to a pose; ``velocity`` is for engines whose contacts need it."""
 
     def place_uav(self, position: Vector, attitude: Quaternion) -> None:
         """Move the UAV to a pose, at rest: to begin a flight there, or to measure distances."""
-        pybullet.resetBasePositionAndOrientation(
-            self._uav, position, attitude, **self._client_argument
-        )
 
     def ground_gap_m(self) -> float:
         """Return the distance in metres from the UAV's hull to the ground, up to 3 m."""
-        points = pybullet.getClosestPoints(
-            self._uav, self._ground, _EXACT_RANGE_M, **self._client_argument
-        )
-        return min((point[8] for point in points), default=_EXACT_RANGE_M)
 
     def distance_m(self, start: Vector, direction: Vector, most_m: float) -> float | None:
         """Return the distance from a place to the first body in a direction, the hull excepted.
 
         ``direction`` has length 1.  None if nothing lies within ``most_m``.
         """
-        (x, y, z), (dx, dy, dz) = start, direction
-        end = x + dx * most_m, y + dy * most_m, z + dz * most_m
-        passed_m = 0.0
-        while passed_m < most_m:
-            begin = x + dx * passed_m, y + dy * passed_m, z + dz * passed_m
-            body, _, share, _, _ = pybullet.rayTest(begin, end, **self._client_argument)[0]
-            if body < 0:
-                return None
-            hit_m: float = passed_m + share * (most_m - passed_m)
-            if body != self._uav:
-                return hit_m
-            passed_m = hit_m + _PAST_HULL_M
-        return None
 
     def hull_contacts(self) -> tuple[HullContact, ...]:
         """Return the UAV's present contacts, one per body."""
-        contacts = pybullet.getContactPoints(self._uav, **self._client_argument)
-        if not contacts:
-            return ()
-        found: dict[str, HullContact] = {}
-        for contact in contacts:
-            # Bullet pushes bodies apart a step before they overlap, so a force without an overlap
-            # is a contact too.
-            distance_m, force_n = contact[8], contact[9]
-            if distance_m <= 0 or force_n > 0:
-                name = self._names[contact[2]]
-                found.setdefault(name, HullContact(body=name, position_m=contact[6]))
-        return tuple(found.values())
 
     def separations(self) -> dict[str, float]:
         """Return the distance in metres from the UAV's hull to each body except the ground.
 
         Exact within 3 m; beyond that the distance of bounding spheres, which is smaller.
         """
-        x, y, z = pybullet.getBasePositionAndOrientation(self._uav, **self._client_argument)[0]
-        result = {}
-        for name, body in self._ids.items():
-            (cx, cy, cz), radius = self._spheres[body]
-            bound = math.dist((x, y, z), (cx, cy, cz)) - radius - self._hull_radius_m
-            if bound < _EXACT_RANGE_M:
-                points = pybullet.getClosestPoints(
-                    self._uav, body, _EXACT_RANGE_M, **self._client_argument
-                )
-                bound = min((point[8] for point in points), default=max(bound, _EXACT_RANGE_M))
-            result[name] = bound
-        return result
 
-    def _add_uav(self, model: VehicleModel, start_m: Vector) -> int:
-        # A cylinder for the rotors, and below it a box for the landing gear.
-        disc, gear = 0.10, BODY_ABOVE_FEET_M - 0.02
-        shape = pybullet.createCollisionShapeArray(
-            shapeTypes=[pybullet.GEOM_CYLINDER, pybullet.GEOM_BOX],
-            radii=[model.size_m / 2, 0.0],
-            lengths=[disc, 0.0],
-            halfExtents=[[0, 0, 0], [0.18 * model.size_m, 0.18 * model.size_m, gear / 2]],
-            collisionFramePositions=[[0, 0, 0.03], [0, 0, -0.02 - gear / 2]],
-            **self._client_argument,
-        )
-        x, y, _ = start_m
-        uav: int = pybullet.createMultiBody(
-            model.mass_kg,
-            shape,
-            self._looks,
-            basePosition=(x, y, BODY_ABOVE_FEET_M),
-            **self._client_argument,
-        )
-        pybullet.changeDynamics(
-            uav,
-            -1,
-            localInertiaDiagonal=model.inertia,
-            linearDamping=0,
-            angularDamping=0,
-            lateralFriction=1.0,
-            restitution=0.0,
-            activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
-            **self._client_argument,
-        )
-        self._names[uav] = "uav"
-        return uav
 
-    def _add(self, body: Body) -> None:
-        """Add a body as one compound of its parts.
+def hull_parts(size_m: float) -> tuple[Part, Part]:
+    """Return the UAV's hull: a cylinder for the rotors, and below it a box for the landing gear."""
+    gear, side = BODY_ABOVE_FEET_M - 0.02, 0.36 * size_m
+    return (
+        Part(shape="cylinder", size_m=(size_m, size_m, _DISC_M), position_m=(0.0, 0.0, 0.03)),
+        Part(shape="box", size_m=(side, side, gear), position_m=(0.0, 0.0, -0.02 - gear / 2)),
+    )
 
-        The engine takes seven times as long for the same parts as links.
-        """
-        parts = body.parts
-        shape = pybullet.createCollisionShapeArray(
-            shapeTypes=[getattr(pybullet, _GEOMETRIES[part.shape]) for part in parts],
-            radii=[part.size_m[0] / 2 for part in parts],
-            lengths=[part.size_m[2] for part in parts],
-            halfExtents=[[side / 2 for side in part.size_m] for part in parts],
-            fileNames=[_BALL_FILE if part.shape == "ellipsoid" else "" for part in parts],
-            meshScales=[list(part.size_m) for part in parts],
-            collisionFramePositions=[part.position_m for part in parts],
-            collisionFrameOrientations=[part.rotation for part in parts],
-            **self._client_argument,
-        )
-        body_id: int = pybullet.createMultiBody(
-            0,
-            shape,
-            self._looks,
-            basePosition=body.position_m,
-            baseOrientation=(0.0, 0.0, math.sin(body.yaw_rad / 2), math.cos(body.yaw_rad / 2)),
-            **self._client_argument,
-        )
-        radius = max(math.hypot(*part.position_m) + math.hypot(*part.size_m) / 2 for part in parts)
-        self._ids[body.name] = body_id
-        self._names[body_id] = body.name
-        self._spheres[body_id] = (body.position_m, radius)
+
+class Spheres:
+    """Bounding spheres of bodies by name, for distances that need not be exact."""
+
+    def __init__(self, bodies: Sequence[Body], size_m: float) -> None:
+        self._hull_m = size_m * 0.6
+        self._found = {
+            body.name: (
+                body.position_m,
+                max(
+                    math.hypot(*part.position_m) + math.hypot(*part.size_m) / 2
+                    for part in body.parts
+                ),
+            )
+            for body in bodies
+        }
+
+    def move(self, name: str, position_m: Vector) -> None:
+        """Move the sphere of a body."""
+        self._found[name] = (position_m, self._found[name][1])
+
+    def gaps_m(self, uav_m: Vector) -> list[tuple[str, float]]:
+        """Return each body's name with the least distance that it may have from the UAV's hull."""
+        return [
+            (name, math.dist(uav_m, centre) - radius - self._hull_m)
+            for name, (centre, radius) in self._found.items()
+        ]

@@ -248,22 +248,22 @@ def test_thrusts_of_any_numbers_become_floats() -> None:
 def test_physics_without_finite_numbers_end_the_flight_as_a_finding(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    from pytest_garl.simulation.physics.world import World
+    from pytest_garl.simulation.physics.bullet_world import BulletWorld
 
-    where, step = World.uav_state, World.step
+    where, step = BulletWorld.uav_state, BulletWorld.step
     steps = itertools.count()
     broken: list[int] = []
 
-    def steps_on(self: World, *forces: Any) -> None:
+    def steps_on(self: BulletWorld, *forces: Any) -> None:
         step(self, *forces)
         broken.extend([1] if next(steps) > 100 else [])
 
-    def nowhere(self: World) -> Any:
+    def nowhere(self: BulletWorld) -> Any:
         position, *rest = where(self)
         return ((NAN, *position[1:]) if broken else position), *rest
 
-    monkeypatch.setattr(World, "step", steps_on)
-    monkeypatch.setattr(World, "uav_state", nowhere)
+    monkeypatch.setattr(BulletWorld, "step", steps_on)
+    monkeypatch.setattr(BulletWorld, "uav_state", nowhere)
     flight = flight_with(lambda: Land())
     assert (flight.crash.kind, flight.crash.error) == ("nonsense", "NotFinite")
     save(flight, tmp_path / "flight.npz")
