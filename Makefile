@@ -10,6 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 FLIES := $(VENV)/.flies
 READY := $(VENV)/.installed
+COMPILED := $(VENV)/.compiled
 CLUSTERS := $(VENV)/.clusters
 ROS := $(VENV)/ros
 DRONEKIT := $(VENV)/dronekit
@@ -53,8 +54,9 @@ layers: $(READY)
 	$(BIN)/lint-imports
 
 # The saved cases come last: the pool that flies them lives to the end, and tests of processes count children.
-tests: $(READY)
-	$(BIN)/pytest -n 2 --dist=worksteal -m "not ray and not long" --durations=15 tests landing_systems
+# Three processes on two cores: many a test waits for a hang, for a clock or for another process.
+tests: $(COMPILED)
+	$(BIN)/pytest -n 3 --dist=worksteal -m "not ray and not long" --durations=15 tests landing_systems
 
 # PyTorch, which only training needs, is not installed there: its tests skip.
 test-others:  ## the fast tests and the saved cases on every other supported Python that is installed
@@ -126,6 +128,11 @@ $(READY): pyproject.toml constraints.txt
 	$(ANEW)
 	$(INSTALL) -e '.[dev,train]'
 	touch $(FLIES) $@
+
+# Once, while the types are checked: the processes of the tests would each compile all of it at first.
+$(COMPILED): $(READY)
+	-$(BIN)/pytest --collect-only -qq tests landing_systems >/dev/null
+	touch $@
 
 $(OTHER): pyproject.toml constraints.txt
 	$(ANEW)

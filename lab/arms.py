@@ -19,7 +19,7 @@ and for ``exploring``, which knows no moments.
 `rule`
     `garl`, but the rule of time to go lets NPCs begin; `rule@1.5` has a margin of 1.5 s.
 `gene`
-    `garl`, but the begin of each NPC is a gene: no story waits for a decision.
+    `garl`, but the begin of each NPC and event is a gene: nothing waits for a decision.
 `shipped`
     `garl`, but its director keeps the weights that ship, and learns nothing of the system.
 `untrained`
@@ -41,8 +41,9 @@ from pytest_garl.npcs.gradient import untrained
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.genes import Genome, NuclearGene
+from pytest_garl.scenarios.groups import DECIDED, EVENT_MOMENTS
 from pytest_garl.scenarios.quantities import Quantity
-from pytest_garl.scenarios.story import DECIDED, STORY_MOMENTS
+from pytest_garl.scenarios.story import STORY_MOMENTS
 from pytest_garl.search.method import Method, SearchPlan
 from pytest_garl.search.method_catalogue import find_method
 from pytest_garl.search.methods.garl import EXPLORING, Garl, GarlParameters
@@ -69,13 +70,15 @@ def decided_by(decider: str) -> PolicySpec:
 
 
 def without_decisions(genome: Genome) -> Genome:
-    """Return a genome that draws no story which waits for a decision."""
+    """Return a genome that draws no story and no event which waits for a decision."""
 
     def undecided(item: Quantity) -> Quantity:
-        if not item.key.endswith(".phase"):
-            return item
-        # A story rounds down, so that this is the choice before.
-        return dataclasses.replace(item, high=STORY_MOMENTS.index(DECIDED) - 1e-6)
+        if item.key.endswith(".phase"):
+            # A story rounds down, so that this is the choice before.
+            return dataclasses.replace(item, high=STORY_MOMENTS.index(DECIDED) - 1e-6)
+        if item.key.endswith(".after"):
+            return dataclasses.replace(item, high=EVENT_MOMENTS.index(DECIDED) - 1.0)
+        return item
 
     def gene(each: NuclearGene) -> NuclearGene:
         return dataclasses.replace(each, properties=tuple(map(undecided, each.properties)))

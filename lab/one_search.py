@@ -32,12 +32,14 @@ from pytest_garl.execution.reference import system_named
 from pytest_garl.execution.result import FlightResult, Origin
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Airframe, airframe_of
-from pytest_garl.npcs.own_director import OwnDirector
+from pytest_garl.npcs.director_progress import Outcome
+from pytest_garl.npcs.search_directors import SearchDirectors
 from pytest_garl.plugin.options import population
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.method import FlownScenario, SearchPlan
+from pytest_garl.search.teaching import outcome_of
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
@@ -115,14 +117,14 @@ def flights_of(
 ) -> Iterator[SearchFlight]:
     """Yield the flights of a search, generation by generation; who stops asking ends it.
 
-    With the airframe of the landing system the arm's director learns from the flights, if it does,
+    With the airframe of the landing system the arm's directors learn from the flights, if they do,
     one generation behind, as in a run of pytest.
     """
     method, number = arm.make(plan), 0
     director = None
     if airframe is not None and method.learns and arm.learns:
-        director = OwnDirector(plan.map, airframe)
-    untaught: deque[list[tuple[Scenario, Flight]]] = deque()
+        director = SearchDirectors(plan.map, airframe)
+    untaught: deque[list[tuple[Scenario, Flight, Outcome]]] = deque()
     npcs = arm.npcs
     while number < count:
         scenarios = list(method.ask())
@@ -142,7 +144,13 @@ def flights_of(
             method.tell([FlownScenario(scenario=each, result=f.result) for each, f in pairs])
         if director is not None:
             is_first = number == len(scenarios)
-            untaught.append([(each, f.record) for each, f in pairs if f.record is not None])
+            untaught.append(
+                [
+                    (each, f.record, outcome_of(f.result))
+                    for each, f in pairs
+                    if f.record is not None
+                ]
+            )
             while len(untaught) > (0 if is_first or not method.overlaps else 1):
                 director.learn(untaught.popleft())
             npcs = arm.npcs.directed_by(director.text)

@@ -19,7 +19,7 @@ import numpy as np
 from lab.stand_in_way import ORDINARY, TAKE_OFF_S, Event, LandingModel, Way, meet_bodies
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.severity import NO_SEVERITY
-from pytest_garl.scenarios.groups import DECOY_KINDS, QUANTITIES
+from pytest_garl.scenarios.groups import DECOY_KINDS, MOMENTS, QUANTITIES
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
@@ -45,25 +45,30 @@ LOSSES = (
 """Gene, its largest value, and the optical depth at that value; it grows with the square."""
 
 
-def stand_in(scenario: Scenario, map: Map, landing: LandingModel = ORDINARY) -> FlightResult:
-    """Return the result of a landing in a scenario of `field`."""
+def way_of(scenario: Scenario, map: Map, rng: np.random.Generator) -> Way:
+    """Return the way of a landing in a scenario of `field`; no event changes it."""
     placed = Placed(scenario, map)
     told, marker = placed.told_m, placed.marker_m
     told = _moved(told, scenario["told.error_m"], scenario["told.towards_deg"])
     away = math.dist(map.uav_start_m[:2], told)
     over_told_s = TAKE_OFF_S + away / CRUISE_MPS
-    rng = np.random.default_rng(scenario.seed)
     searches_s = 2.0 + math.dist(told, marker) + float(rng.uniform(0, 1))
     clear = _clearness(scenario)
     if clear < 0.6:
         searches_s *= 1 + 8 * (0.6 - clear)
-    way = Way(
+    return Way(
         start_m=(map.uav_start_m[0], map.uav_start_m[1]),
         told_m=told,
         marker_m=marker,
         over_told_s=over_told_s,
         descends_s=over_told_s + searches_s,
     )
+
+
+def stand_in(scenario: Scenario, map: Map, landing: LandingModel = ORDINARY) -> FlightResult:
+    """Return the result of a landing in a scenario of `field`."""
+    rng = np.random.default_rng(scenario.seed)
+    way, clear = way_of(scenario, map, rng), _clearness(scenario)
     off_m = landing.drift * _off_m(scenario, way, rng)
     events: list[Event] = []
     gaps = meet_bodies(scenario, map, way, events, landing.gives_way_m)
@@ -76,7 +81,7 @@ def stand_in(scenario: Scenario, map: Map, landing: LandingModel = ORDINARY) -> 
         "touchdown_speed": 2.0 - landing.sink * _sink_mps(scenario),
         "touchdown_tilt": 0.35 - 0.05 * scenario["wind.turbulence"],
         "dropout": 3.0 - max(0.0, 8 * (0.75 - clear)),
-        "decoy": _nearest_decoy_m(scenario, told, marker) if landing.follows_decoys else 10.0,
+        "decoy": _nearest_decoy_m(scenario, way) if landing.follows_decoys else 10.0,
         "tracking": DISTANCE_M - 0.9 * off_m,
         "slide": 0.5 - landing.slide * _slide_m(scenario),
         "crash": 1.0,
@@ -105,7 +110,9 @@ def _losses(scenario: Scenario) -> list[tuple[str, float, float]]:
 
 
 def _begins_s(scenario: Scenario, name: str, way: Way) -> float:
-    """Return when an event begins."""
+    """Return when an event begins; one that waits for a decision by the fixed rule, at 3 m."""
+    if name in scenario.decided_events:
+        return way.moments_s[MOMENTS.index("3 m")]
     moment = int(QUANTITIES[f"{name}.after"].flown(scenario[f"{name}.after"]))
     return way.moments_s[moment] + scenario[f"{name}.from_s"]
 
@@ -154,11 +161,12 @@ def _decoys(scenario: Scenario) -> list[tuple[str, tuple[float, float]]]:
     return found
 
 
-def _nearest_decoy_m(
-    scenario: Scenario, told: tuple[float, float], marker: tuple[float, float]
-) -> float:
-    own = math.dist(told, marker)
-    gaps = [math.dist((told[0] + x, told[1] + y), told) - own for _, (x, y) in _decoys(scenario)]
+def _nearest_decoy_m(scenario: Scenario, way: Way) -> float:
+    own = math.dist(way.told_m, way.marker_m)
+    gaps = [
+        math.dist((way.told_m[0] + x, way.told_m[1] + y), way.told_m) - own
+        for _, (x, y) in _decoys(scenario)
+    ]
     return min([10.0, *gaps])
 
 

@@ -8,11 +8,13 @@ find it again: "module:name" is its id in ledgers, cases and baselines, as of a 
 from __future__ import annotations
 
 import abc
+import contextlib
 import hashlib
 import os
 import re
+import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 from types import FrameType
@@ -36,7 +38,8 @@ class ProgramSystem(abc.ABC):
 
     ``name`` is an identifier, ``folder`` is where its relative paths begin (by default that of the
     module that makes it), ``sources`` are patterns of files below ``folder``, of which an empty
-    tuple means all files in ``home``, without tests and caches.  A subclass sets ``settings``: all
+    tuple means all files in ``home``, without tests and caches, and ``environment`` adds to the
+    environment of pytest.  A subclass sets ``settings``: all
     that decides how it flies besides its sources, in a form whose ``repr`` is the same in every
     process.
     """
@@ -47,8 +50,20 @@ class ProgramSystem(abc.ABC):
     settings: tuple[object, ...] = ()
 
     def __init__(
-        self, name: str, *, folder: str | Path | None, sources: Sequence[str], airframe: Airframe
+        self,
+        name: str,
+        *,
+        folder: str | Path | None,
+        sources: Sequence[str],
+        airframe: Airframe,
+        environment: Mapping[str, str] | None = None,
     ) -> None:
+        self.environment = dict(environment or {})
+        for key, value in self.environment.items():
+            if not isinstance(key, str) or not isinstance(value, str):
+                raise LandingSystemError(
+                    f"{name}: environment has {key!r}: {value!r}; expected texts, as 'SPEED': '2'"
+                )
         if isinstance(sources, str) or not all(isinstance(each, str) for each in sources):
             raise LandingSystemError(
                 f"{name}: sources={sources!r}: expected a list of patterns, as ['lander/**/*.py']"
@@ -162,6 +177,23 @@ AnySystem = type | ProgramSystem
 def program_named(module: str, name: str) -> ProgramSystem | None:
     """Return the program that a module of this process has made; None if it has made none."""
     return _made.get((module, name))
+
+
+def started_by(pid: int) -> list[int]:
+    """Return the ids of all processes below one, in any session, where the system tells (Linux)."""
+    found = [pid]
+    for each in found:
+        for file in Path(f"/proc/{each}/task").glob("*/children"):
+            with contextlib.suppress(OSError):
+                found += [int(child) for child in file.read_text().split()]
+    return found[1:]
+
+
+def kill(pids: Iterable[int]) -> None:
+    """Kill processes; those that have ended are left out."""
+    for pid in pids:
+        with contextlib.suppress(OSError):
+            os.kill(pid, signal.SIGKILL)
 
 
 def _making_module() -> dict[str, Any]:

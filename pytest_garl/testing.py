@@ -368,15 +368,17 @@ class _Checker:
         other = self._fly(self._system, self._drawn, seconds)
         yaws: list[tuple[float, float]] = []
         reused = _reusing_one_instance(self._system, yaws)
-        for fresh, scenario, problem in (
-            (first, self._calm, "two flights of the same scenario differ"),
-            (other, self._drawn, _REMEMBERS),
-            (first, self._calm, _REMEMBERS),
-        ):
-            again = self._fly(reused, scenario, seconds)
-            self._check_yaw(again.flight, yaws)
-            self._check_equal(fresh.flight, again.flight, problem)
-        reused.close_instance()
+        try:
+            for fresh, scenario, problem in (
+                (first, self._calm, "two flights of the same scenario differ"),
+                (other, self._drawn, _REMEMBERS),
+                (first, self._calm, _REMEMBERS),
+            ):
+                again = self._fly(reused, scenario, seconds)
+                self._check_yaw(again.flight, yaws)
+                self._check_equal(fresh.flight, again.flight, problem)
+        finally:
+            reused.close_instance()
         return other
 
     def _check_yaw(self, flight: Flight, yaws: list[tuple[float, float]]) -> None:

@@ -130,6 +130,7 @@ def test_flying_processes_are_of_the_class_that_was_asked_for(
     assert cpu_dispatch.cpu_class_of_flights() == cpu_dispatch.dispatched()
 
 
+@pytest.mark.long
 @needs_avx2
 @pytest.mark.skipif(importlib.util.find_spec("torch") is None, reason="PyTorch is not installed")
 def test_training_computes_by_the_baseline() -> None:

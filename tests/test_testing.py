@@ -281,8 +281,9 @@ def test_check_finds_a_flight_that_depends_on_the_one_before() -> None:
     ],
 )
 def test_check_says_that_a_system_does_not_land_in_clear_air(
-    system: type, words: list[str]
+    system: type, words: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(testing, "time_limit_s", lambda limits: 25.0)
     check = check_landing_system(system)
     (fault,) = check.faults
     assert not check.passed
@@ -415,7 +416,7 @@ def test_check_flies_probes_of_a_system_that_lands(monkeypatch: pytest.MonkeyPat
 def test_check_flies_no_probes_of_a_system_that_does_not_land() -> None:
     plan = testing.plan_for(map="lawn")
     checker = testing._Checker(Climbs, dataclasses.replace(plan, probes=True))
-    calm = checker._fly(Climbs, checker._calm, 120.0)
+    calm = checker._fly(Climbs, checker._calm, 25.0)
     judge = JudgeProcess()
     checker._note_result(calm, judged(calm.flight, plan.limits))
     assert checker._probe(judge, calm.flight) == ()

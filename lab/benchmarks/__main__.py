@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lab.benchmarks import collect, field, ledger, overhead, speed, throughput
+from lab.benchmarks import collect, field, ledger, overhead, programs, speed, throughput
 
 speed.main()
 overhead.main()
@@ -10,3 +10,4 @@ collect.main()
 ledger.main()
 throughput.main()
 field.main()
+programs.main()

@@ -27,9 +27,10 @@ from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.genes import OFF, ON
+from pytest_garl.scenarios.groups import DECIDED
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.story import DECIDED, GRADES, STORY_MOMENTS
+from pytest_garl.scenarios.story import GRADES, STORY_MOMENTS
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.method import FlownScenario, SearchPlan
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shlex
@@ -15,6 +16,7 @@ import click
 from pytest_garl.cli import skeleton
 from pytest_garl.cli.check_command import imported_system
 from pytest_garl.cli.pytest_settings import PYTHONPATH, SETTINGS, find_settings
+from pytest_garl.companion.companion_program import CompanionProgram
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import command
 
@@ -33,7 +35,10 @@ import pytest
 from pytest_garl import Camera, CompanionProgram
 
 # How the program is started, with its arguments, and what its camera is.
-lander = CompanionProgram("python {script}", camera=Camera(width_px=640, height_px=480))
+lander = CompanionProgram(
+    {words},
+    camera=Camera(width_px=640, height_px=480),
+)
 """
 TEST = """\
 pytestmark = pytest.mark.garl(system={system}, maps=["court", "lawn"])
@@ -66,7 +71,7 @@ class _Step:
 
 
 @click.command()
-@click.argument("system", metavar="[MODULE:CLASS|SCRIPT]", default="")
+@click.argument("system", metavar="[MODULE:CLASS|SCRIPT|COMMAND]", default="")
 @click.option(
     "--example", is_flag=True, help="Write the three landing systems of the paper and their tests."
 )
@@ -75,7 +80,8 @@ def init(system: str, example: bool) -> None:
 
     MODULE:CLASS is your landing system, such as my_landing:MyLandingSystem. Without it the command
     writes one to begin with, my_landing.py, which lands in clear air. SCRIPT is a Python program
-    that speaks MAVLink, such as my_lander.py. Run it in the folder in which you will run pytest. It
+    that speaks MAVLink, such as my_lander.py; COMMAND is the line that starts it, such as 'python
+    my_lander.py --marker {marker_id}'. Run garl init in the folder in which you will run pytest. It
     changes no line that is there; if all is there it changes nothing.
     """
     here = Path.cwd()
@@ -95,19 +101,23 @@ def init(system: str, example: bool) -> None:
     if not system:
         system = SKELETON
         steps.append(_write_skeleton(here / f"{SKELETON.partition(':')[0]}.py"))
-    is_script = system.endswith(".py")
-    if not is_script:
+    folder = next((here / path for path in settings.test_paths if (here / path).is_dir()), here)
+    if system.endswith(".py") or len(system.split()) > 1:
+        line = f"python {shlex.quote(system)}" if (here / system).is_file() else system
+        program = CompanionProgram(line, folder=here)
+        program.check()
+        name, text, needs_path = program.name, _test_of_program(line, here, folder), False
+    else:
         # The import says what is wrong with the name before anything is written with it.
         imported_system(system)
-    elif not (here / system).is_file():
-        raise GarlError(f"there is no file {system} in {here}; expected a script, or MODULE:CLASS")
-    folder = next((here / path for path in settings.test_paths if (here / path).is_dir()), here)
-    test = folder / _test_file(system)
-    needs_path = not is_script and _needs_path(system, folder, here)
+        module = system.partition(":")[0].rpartition(".")[2]
+        name, text = re.sub(r"\W", "_", module), _test_of(system)
+        needs_path = _needs_path(system, folder, here)
+    test = folder / f"test_{name}.py"
     wanted = SETTINGS | (PYTHONPATH if needs_path else {})
     steps += [
         _Step(file=settings.file, done=settings.add(wanted)),
-        _write(test, _test_of_script(here / system, folder) if is_script else _test_of(system)),
+        _write(test, text),
         _ignore(here / ".gitignore"),
     ]
     _show(steps, test, here)
@@ -123,14 +133,6 @@ def _show(steps: Sequence[_Step], test: Path, here: Path) -> None:
     click.echo("        flies it in clear air and names its faults")
     click.echo(f"    {command('pytest', '--garl-budget=40', shown)}")
     click.echo("        searches: 40 flights on each map, saved cases in scenarios/regressions")
-
-
-def _test_file(system: str) -> str:
-    """Return the name of the test file of a landing system."""
-    module = Path(system).stem if system.endswith(".py") else system.partition(":")[0]
-    module = module.rpartition(".")[2]
-    name = re.sub(r"\W", "_", module)
-    return f"test_{name}.py"
 
 
 def _needs_path(system: str, folder: Path, here: Path) -> bool:
@@ -150,10 +152,12 @@ def _test_of(system: str) -> str:
     return head + TEST.format(system=qualified)
 
 
-def _test_of_script(script: Path, folder: Path) -> str:
-    """Return the tests of a companion program; its path begins at the test file."""
-    path = Path(os.path.relpath(script, folder)).as_posix()
-    return PROGRAM.format(script=shlex.quote(path)) + TEST.format(system="lander")
+def _test_of_program(line: str, here: Path, folder: Path) -> str:
+    """Return the tests of a companion program, which runs in the folder of its line."""
+    words = json.dumps(line, ensure_ascii=False)
+    if folder != here:
+        words += f',\n    folder="{Path(os.path.relpath(here, folder)).as_posix()}"'
+    return PROGRAM.format(words=words) + TEST.format(system="lander")
 
 
 def _write_skeleton(file: Path) -> _Step:

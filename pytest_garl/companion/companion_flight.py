@@ -35,7 +35,7 @@ from pytest_garl.landing_system import (
     Observation,
     VehicleState,
 )
-from pytest_garl.program import ProgramFailedError
+from pytest_garl.program import ProgramFailedError, kill, started_by
 from pytest_garl.vehicle.autopilot import ArduCopter
 from pytest_garl.vehicle.mavlink import MavlinkLink
 from pytest_garl.vehicle.ned import on_globe
@@ -316,8 +316,9 @@ class CompanionProcess:
             )
 
     def close(self) -> None:
-        """Kill the process, and what is left of its group."""
+        """Kill the process, what it has started, and what is left of its group."""
         self._wait.close()
+        kill(started_by(self._process.pid))
         with contextlib.suppress(OSError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.kill()

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import shlex
 import shutil
 import string
+import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,6 +22,8 @@ from pytest_garl.vehicle.autopilot import ArduCopter
 from pytest_garl.vehicle.mavlink import dialect
 from pytest_garl.vehicle.px4 import Px4Copter
 
+OLDEST = (3, 9)
+"""Version of Python from which on a program can fly."""
 Windows = Literal["refuse", "ignore"]
 
 
@@ -70,6 +74,11 @@ class CompanionProgram(ProgramSystem):
             raise LandingSystemError(
                 f"CompanionProgram(windows={windows!r}): expected {listed(get_args(Windows))}"
             )
+        if vehicle is not None and not isinstance(vehicle, ArduCopter | Px4Copter):
+            raise LandingSystemError(
+                f"CompanionProgram(vehicle={shown(vehicle)}): expected ArduCopter(...) or "
+                "Px4Copter(...)"
+            )
         first, self.arguments = _parsed(command)
         plain = airframe or Airframe()
         super().__init__(
@@ -79,10 +88,10 @@ class CompanionProgram(ProgramSystem):
             airframe=dataclasses.replace(
                 plain, camera=camera or plain.camera, control_rate_hz=MAX_RATE_HZ
             ),
+            environment=environment,
         )
         self.vehicle: ArduCopter | Px4Copter = vehicle or ArduCopter()
         self.python, self.windows = str(python or first), windows
-        self.environment = dict(environment or {})
         script = self.folder / self.arguments[0]
         if script.suffix == ".py":
             self.home = script.resolve().parent
@@ -102,10 +111,14 @@ class CompanionProgram(ProgramSystem):
                 f"{self.name}: there is no file {script!r} in {self.folder}; paths of a "
                 "CompanionProgram begin there, or at its folder="
             )
-        if self._interpreter() is None:
+        python = self._interpreter()
+        version = _version_of(python) if python is not None else None
+        if version is None or version < OLDEST:
+            version_text = ".".join(map(str, version or ()))
+            found = f"found Python {version_text} as" if version else "there is no Python"
             raise LandingSystemError(
-                f"{self.name}: there is no Python {self.python!r}; expected that of a virtual "
-                "environment, as python='venv/bin/python'"
+                f"{self.name}: {found} {self.python!r}; expected 3.9 or later, as that of a "
+                "virtual environment: python='venv/bin/python'"
             )
         if airframe_of(self).control_rate_hz != MAX_RATE_HZ:
             raise LandingSystemError(f"{self.name}: its airframe was changed")
@@ -144,6 +157,17 @@ class CompanionProgram(ProgramSystem):
             airframe_of(self),
             self.vehicle,
         )
+
+
+@functools.cache
+def _version_of(python: str) -> tuple[int, ...] | None:
+    """Return the version of a Python, (3, 11); None for what is none."""
+    ask = "import sys; print('%d.%d' % sys.version_info[:2])"
+    try:
+        said = subprocess.run([python, "-c", ask], capture_output=True, text=True, timeout=30)
+        return tuple(int(each) for each in said.stdout.split("."))
+    except (OSError, ValueError, subprocess.SubprocessError):
+        return None
 
 
 def _parsed(command: str) -> tuple[str, tuple[str, ...]]:

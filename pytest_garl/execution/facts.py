@@ -19,7 +19,7 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import Database
 from pytest_garl.execution.result import Origin
 from pytest_garl.files.json_values import dataclass_from, parse_json
-from pytest_garl.npcs.director_progress import DirectorProgress
+from pytest_garl.npcs.director_progress import Progress
 
 T = TypeVar("T")
 _SESSION = "session "
@@ -280,22 +280,22 @@ class Facts:
         return [self._typed(Origin, key, each) for each in self._get(key) or ()]
 
     def note_director(self, search: str, generation: int, director: str) -> None:
-        """Note the weights that decide in the flights of a generation when NPCs begin."""
+        """Note the weights that decide in a generation when NPCs begin and events strike."""
         self._first(_director(search, generation), director)
 
     def director(self, search: str, generation: int) -> str:
         """Return what decides in the flights of a generation; empty for the weights that ship."""
         return self._text(_director(search, generation)) or ""
 
-    def note_progress(self, search: str, generation: int, progress: DirectorProgress) -> None:
-        """Note what a generation says of the director with which it was flown."""
+    def note_progress(self, search: str, generation: int, progress: Progress) -> None:
+        """Note what a generation says of the directors with which it was flown."""
         self._first(_progress(search, generation), dataclasses.asdict(progress))
 
-    def progress(self, search: str, generation: int) -> DirectorProgress | None:
-        """Return what a generation says of its director; None if nothing learned from it."""
+    def progress(self, search: str, generation: int) -> Progress | None:
+        """Return what a generation says of its directors; None if nothing learned from it."""
         key = _progress(search, generation)
         found = self._get(key)
-        return None if found is None else self._typed(DirectorProgress, key, found)
+        return None if found is None else self._typed(Progress, key, found)
 
     def note_user_failures(self, failures: Iterable[FailedFlightAssertion]) -> None:
         """Note the failed assertions about users' own properties."""

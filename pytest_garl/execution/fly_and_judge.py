@@ -19,6 +19,7 @@ from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import BUILT_IN
 from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.flight.flight import Crash, Touchdown
+from pytest_garl.scenarios.groups import QUANTITIES
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
@@ -98,8 +99,10 @@ def judge_record(
     if job.simulator == BUILT_IN:
         record = measured(record)
     result = judged(record, job.limits)
-    severity = severity_of(record, result.verdict, scenario, map, job.npcs)
     decided = decided_genes(scenario, record, job.npcs)
+    # It tells when an event struck, and not that somebody decided it.
+    struck = {key: value for key, value in decided if key in QUANTITIES}
+    severity = severity_of(record, result.verdict, scenario.replace(struck), map, job.npcs)
     result = dataclasses.replace(result, severity=severity, decided=decided)
     return result, record.sha256, record.wall_s
 

@@ -18,7 +18,7 @@ from typing import IO, Literal
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.messages import shortened
-from pytest_garl.program import ProgramFailedError
+from pytest_garl.program import ProgramFailedError, kill, started_by
 
 LONGEST_LINE = 2**20
 """Bytes of an answer: 1,000 points of a path and 100 detections take a tenth."""
@@ -32,6 +32,7 @@ QUIET_S = 2.0
 """After so much time without an answer it is said on stderr what is waited for: if the call then
 takes too long, the report of it has that line."""
 _PR_SET_PDEATHSIG = 1
+_PR_SET_CHILD_SUBREAPER = 36
 _prctl = getattr(ctypes.CDLL(None), "prctl", None)
 
 
@@ -172,10 +173,12 @@ class Child:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
+    started = started_by(process.pid)
     with contextlib.suppress(OSError):
         if process.stdin is not None:
             process.stdin.close()
     _wait(process, ENDING_S)
+    kill(started)
     # Nobody has taken its status yet, so its group cannot be another one's by now.
     with contextlib.suppress(OSError):
         os.killpg(process.pid, signal.SIGKILL)
@@ -195,6 +198,7 @@ def _wait(process: subprocess.Popen[bytes], limit_s: float) -> bool:
 
 
 def _end_with_parent() -> None:
-    """Have the kernel kill this process when the one that started it ends."""
+    """Have the kernel kill this process when the one that started it ends; adopt its orphans."""
     if _prctl is not None:
         _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        _prctl(_PR_SET_CHILD_SUBREAPER, 1)

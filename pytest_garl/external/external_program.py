@@ -55,8 +55,14 @@ class ExternalProgram(ProgramSystem):
                 "'--fast']"
             )
         own = name if name is not None else _name_of(command)
-        super().__init__(own, folder=folder, sources=sources, airframe=airframe or Airframe())
-        self.command, self.environment = tuple(command), dict(environment or {})
+        super().__init__(
+            own,
+            folder=folder,
+            sources=sources,
+            airframe=airframe or Airframe(),
+            environment=environment,
+        )
+        self.command = tuple(command)
         self.settings = (self.command, tuple(sorted(self.environment.items())))
 
     def check(self) -> None:
@@ -79,6 +85,9 @@ class ExternalProgram(ProgramSystem):
                 f"{self.name}: {word!r} is no executable file; expected a program (chmod +x), or "
                 f"the one that runs it before it, as ['python3', {word!r}]"
             )
+        script = next((each for each in self.command[1:] if each[:1] != "-"), "")
+        if script.endswith(".py") and not (self.folder / script).is_file():
+            raise LandingSystemError(f"{self.name}: there is no file {script!r} in {self.folder}")
         if airframe_of(self).control_rate_hz is not None:
             raise LandingSystemError(
                 f"{self.name}: Airframe(control_rate_hz=...) is for classes with control(state); "

@@ -5,16 +5,22 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pytest_garl.errors import PolicyError
 from pytest_garl.messages import shown
 from pytest_garl.npcs.director import Director, LearnedDirector, TimeToGo, Watch
+from pytest_garl.npcs.director_progress import AND_EVENTS
+from pytest_garl.npcs.event_watch import STRIKING, LearnedStrikes
 from pytest_garl.npcs.interference import Interfering
 from pytest_garl.npcs.minds import Intercepting
 from pytest_garl.scenarios.story import story_of, waits_for_decision
-from pytest_garl.simulation.npc_policy import Move, Situation
+from pytest_garl.simulation.npc_policy import EventDirector, Move, Situation
+
+if TYPE_CHECKING:
+    from pytest_garl.npcs.learned import Network
 
 
 class Directed(Interfering):
@@ -25,6 +31,11 @@ class Directed(Interfering):
     """
 
     decides_begin = True
+
+    @staticmethod
+    def event_director(director: str = "") -> EventDirector | None:
+        """Return what decides when events strike, as :func:`event_director_of` reads it."""
+        return event_director_of(director)
 
     def __init__(self, grade: str, director: str = "") -> None:
         super().__init__(grade, Intercepting())
@@ -59,13 +70,14 @@ TIME_TO_GO = "time-to-go"
 
 @functools.lru_cache(maxsize=64)
 def director_of(text: str) -> Director:
-    """Return the director that a text names.
+    """Return the director of NPCs that a text names, up to :data:`AND_EVENTS`.
 
     Empty: the weights that ship.  ``time-to-go 0.5 1``: that rule, with its margin and its time
     after an unseen UAV passed 3 m.  Else the weights of a network, as ``Network.text`` gives them.
     """
     from pytest_garl.npcs.learned import learned_director, network_from
 
+    text = text.partition(AND_EVENTS)[0]
     if not text:
         return learned_director()
     rule, *constants = text.split()
@@ -79,3 +91,19 @@ def director_of(text: str) -> Director:
             "UNSEEN_S', two numbers"
         ) from error
     return TimeToGo(margin_s=margin_s, unseen_s=unseen_s)
+
+
+def event_director_of(text: str) -> EventDirector | None:
+    """Return the director of events that a text names after :data:`AND_EVENTS`, fresh for a flight.
+
+    None without one: the fixed rule decides, which is what ships.
+    """
+    weights = text.partition(AND_EVENTS)[2]
+    return LearnedStrikes(_event_network(weights)) if weights else None
+
+
+@functools.lru_cache(maxsize=64)
+def _event_network(weights: str) -> Network:
+    from pytest_garl.npcs.learned import network_from
+
+    return network_from(weights, STRIKING)

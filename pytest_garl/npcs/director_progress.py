@@ -1,10 +1,13 @@
-"""What a generation of a search says of its director: the ledger holds it, the summary tells it."""
+"""What a generation of a search says of its directors: the ledger has it, the summary tells it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+
+AND_EVENTS = "|"
+"""In a text of weights it stands between those of NPCs and those of events."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +31,42 @@ class DirectorProgress:
     met: int
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What a director of events learns of a flight's end: whether it violates, and its worth."""
+
+    violates: bool
+    worth: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EventProgress:
+    """How good the director of events was in a generation, before it learned from it.
+
+    In ``flights`` flights each kind of event that did not strike could have struck at any time.  By
+    what followed strikes in flights of this landing system, strikes as the learned weights decide
+    were worth ``learned`` in the mean, by the fixed rule ``rule``, and the best ones ``best``: 1 is
+    a violation.  Of ``struck`` events that struck ``expected`` were expected to be followed by a
+    violation, and ``violated`` were.
+    """
+
+    flights: int
+    learned: float
+    rule: float
+    best: float
+    struck: int
+    expected: float
+    violated: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """What a generation says of both directors, that of NPCs and that of events."""
+
+    npcs: DirectorProgress
+    events: EventProgress
+
+
 def total(progresses: Iterable[DirectorProgress]) -> DirectorProgress | None:
     """Return what several generations say together; None if no NPC could have begun."""
     found = [each for each in progresses if each.npcs]
@@ -47,4 +86,25 @@ def total(progresses: Iterable[DirectorProgress]) -> DirectorProgress | None:
         seen=sum(each.seen for each in found),
         expected=math.fsum(each.expected for each in found),
         met=sum(each.met for each in found),
+    )
+
+
+def total_of_events(progresses: Iterable[EventProgress]) -> EventProgress | None:
+    """Return what several generations say together; None if no event struck."""
+    found = [each for each in progresses if each.flights]
+    flights = sum(each.flights for each in found)
+    if not any(each.struck for each in found):
+        return None
+
+    def mean(worth: str) -> float:
+        return math.fsum(getattr(each, worth) * each.flights for each in found) / flights
+
+    return EventProgress(
+        flights=flights,
+        learned=mean("learned"),
+        rule=mean("rule"),
+        best=mean("best"),
+        struck=sum(each.struck for each in found),
+        expected=math.fsum(each.expected for each in found),
+        violated=sum(each.violated for each in found),
     )

@@ -23,6 +23,7 @@ from pytest_garl.files.json_values import parse_json
 from pytest_garl.messages import listed, shown
 from pytest_garl.npcs.director import FEATURES, WAITING, LearnedDirector
 from pytest_garl.npcs.encodings import ENCODINGS, on_turn
+from pytest_garl.npcs.event_watch import EVENT_INPUTS, STRIKING
 from pytest_garl.npcs.grades import GRADE_LIMITS
 from pytest_garl.npcs.interference import Belief, Interfering
 from pytest_garl.npcs.weights import WEIGHTS
@@ -33,6 +34,7 @@ FORMAT = 1
 SHAPES: Mapping[str, tuple[int, int]] = {
     **{name: (each.size, each.actions) for name, each in ENCODINGS.items()},
     WAITING: (len(FEATURES), 2),
+    STRIKING: (EVENT_INPUTS, 2),
 }
 """How many inputs and actions a network has, by the name of its input."""
 DIRECTOR = WEIGHTS / "grades" / "director.npz"
@@ -68,8 +70,11 @@ class Network:
         return f"{','.join(map(str, sizes))}:{base64.b64encode(b''.join(parts)).decode()}"
 
 
-def network_from(text: str) -> Network:
-    """Return the network of a director from its text; raise PolicyError if it is none."""
+def network_from(text: str, state: str = WAITING) -> Network:
+    """Return the network of a director from its text; raise PolicyError if it is none.
+
+    ``state`` is the name of its input.
+    """
     try:
         told, _, encoded = text.partition(":")
         sizes = [int(size) for size in told.split(",")]
@@ -83,8 +88,8 @@ def network_from(text: str) -> Network:
             f"NPC policy: found the director {shown(text)}; expected the sizes of its layers and "
             f"its weights ({error})"
         ) from error
-    _check(Path("the director of this search"), layers, WAITING)
-    return Network(state=WAITING, layers=tuple(layers))
+    _check(Path("the director of this search"), layers, state)
+    return Network(state=state, layers=tuple(layers))
 
 
 class LearnedPolicy:

@@ -62,7 +62,7 @@ class OwnDirector:
             learned=mean_worth(LearnedDirector(network=self.network), things),
             shipped=mean_worth(LearnedDirector(network=self._shipped), things),
             rule=mean_worth(RULE, things),
-            best=_mean([max(each.never, float(each.go.max())) for each in things]),
+            best=mean([max(each.never, float(each.go.max())) for each in things]),
             seen=len(seen),
             expected=_in_order(expected),
             met=sum(met for _, met in seen),
@@ -83,10 +83,11 @@ def mean_worth(director: Director, things: Sequence[Stopping]) -> float:
         goes = (number for number, row in enumerate(each.states) if director.decides(row))
         number = next(goes, None)
         worths.append(each.never if number is None else float(each.go[number]))
-    return _mean(worths)
+    return mean(worths)
 
 
-def _mean(values: Sequence[float]) -> float:
+def mean(values: Sequence[float]) -> float:
+    """Return the mean, 0 of nothing."""
     return _in_order(values) / len(values) if values else 0.0
 
 

@@ -139,7 +139,8 @@ OPTIONS = (
         name="npcs",
         metavar="POLICY",
         help=f"NPC policy, which moves people, dogs and birds: {', '.join(policy_names())}, or "
-        f"weights (.npz) that `garl train` wrote (default: as the domain says; in the domain paper "
+        "weights (.npz) that `garl train` wrote (default: as the domain says, graded with its "
+        "learned director where NPCs may interfere; in the domain paper "
         f"{DEFAULT_POLICY}, and the methods of the paper have their own, see docs/methods.md; with "
         "--garl-repeat the policy of the search).",
     ),

@@ -34,7 +34,9 @@ def garl_slot(request: pytest.FixtureRequest) -> Target:
 def npcs(request: pytest.FixtureRequest) -> PolicySpec | None:
     """Return the NPC policy of ``--garl-npcs``, or None for the one of the test's domain.
 
-    Override this fixture in a conftest.py to choose another.
+    Where NPCs may interfere, as in the domain field, that is graded: a learned director decides
+    when curious and chasing NPCs begin and events strike.  Override this fixture in a conftest.py
+    to choose another.
     """
     from pytest_garl.npcs.policy_catalogue import policy_spec
 

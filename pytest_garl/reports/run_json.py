@@ -83,6 +83,10 @@ def _search(run: RunRecord, search: SearchRecord) -> dict[str, Any]:
         "model": None if search.model is None else dataclasses.asdict(search.model),
         "movers": None if search.movers is None else dataclasses.asdict(search.movers),
         "director": None if search.director is None else dataclasses.asdict(search.director),
+        "strikes": None if search.strikes is None else dataclasses.asdict(search.strikes),
+        "event_director": None
+        if search.event_director is None
+        else dataclasses.asdict(search.event_director),
         "signatures": [
             {
                 **_kind(run, search, kind),

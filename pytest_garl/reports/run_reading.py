@@ -19,7 +19,7 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import Origin
 from pytest_garl.execution.severity import Severity
 from pytest_garl.execution.stored_ledger import checked_ledger
-from pytest_garl.npcs.director_progress import DirectorProgress, total
+from pytest_garl.npcs.director_progress import AND_EVENTS, total, total_of_events
 from pytest_garl.reports.control_arm import control_arm, is_control
 from pytest_garl.reports.run_record import (
     KindRecord,
@@ -30,7 +30,13 @@ from pytest_garl.reports.run_record import (
     SearchRecord,
     place_of,
 )
-from pytest_garl.reports.search_origins import Made, model_record, mover_record, origin_records
+from pytest_garl.reports.search_origins import (
+    Made,
+    model_record,
+    mover_record,
+    origin_records,
+    strike_record,
+)
 from pytest_garl.scenarios.files import dump_scenario
 
 _NONE: Mapping[str, tuple[Severity, str]] = MappingProxyType({})
@@ -134,6 +140,9 @@ def _search(
     random = {f.id.slot_id for f in flights if is_control(method, f.id.slot.generation)}
     made = _with_origins(facts, flights)
     compares = control is not None and control.later.flights > 0
+    generations = sorted({(each.id.search, each.id.slot.generation) for each in flights})
+    progress = [found for each in generations if (found := facts.progress(*each))]
+    taught = {each for each in generations if AND_EVENTS in facts.director(*each)}
     return SearchRecord(
         key=key,
         name=name,
@@ -148,15 +157,13 @@ def _search(
         origins=origin_records(made),
         model=model_record(made),
         movers=mover_record((flight, jobs[flight.id.search].npcs) for flight in flights),
-        director=_director(facts, flights),
+        director=total(each.npcs for each in progress),
+        strikes=strike_record(
+            (flight, (flight.id.search, flight.id.slot.generation) in taught) for flight in flights
+        ),
+        event_director=total_of_events(each.events for each in progress),
         camera=facts.camera(key.system),
     )
-
-
-def _director(facts: Facts, flights: Sequence[LedgerFlight]) -> DirectorProgress | None:
-    """Return what the generations of a search say of its director."""
-    generations = sorted({(each.id.search, each.id.slot.generation) for each in flights})
-    return total(filter(None, (facts.progress(*each) for each in generations)))
 
 
 def _with_origins(facts: Facts, flights: Sequence[LedgerFlight]) -> Made:

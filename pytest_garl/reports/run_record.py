@@ -21,10 +21,15 @@ from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.severity import Severity
-from pytest_garl.npcs.director_progress import DirectorProgress
+from pytest_garl.npcs.director_progress import DirectorProgress, EventProgress
 from pytest_garl.reports.causes import cause_of, tells_cause, title_of
 from pytest_garl.reports.control_arm import ControlArm
-from pytest_garl.reports.search_origins import ModelRecord, MoverRecord, OriginRecord
+from pytest_garl.reports.search_origins import (
+    ModelRecord,
+    MoverRecord,
+    OriginRecord,
+    StrikeRecord,
+)
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.verdicts.ending import ending_of
 from pytest_garl.verdicts.kinds import hill_number
@@ -217,6 +222,10 @@ class SearchRecord:
     """Who moved the NPCs; None without NPCs."""
     director: DirectorProgress | None = None
     """What the flights say of the director that learned from them; None if none did."""
+    strikes: StrikeRecord | None = None
+    """Who let events strike; None without events."""
+    event_director: EventProgress | None = None
+    """What the flights say of the director of events; None if none learned from a strike."""
     camera: Mapping[str, Any] | None = None
     """What the ledger says of the landing system's camera; None if it does not."""
 

@@ -60,6 +60,8 @@ def run_text(run: RunRecord) -> str:
             origins_text(search),
             movers_text(search),
             director_text(search),
+            strikes_text(search),
+            event_director_text(search),
         )
         lines += [f"  {text}" for text in told if text]
         lines += [line for kind in search.kinds for line in _kind_lines(run, search, kind)]
@@ -133,6 +135,8 @@ def kinds_lines(search: SearchRecord) -> list[str]:
         origins_text(search),
         movers_text(search),
         director_text(search),
+        strikes_text(search),
+        event_director_text(search),
     )
     return [text for text in texts if text]
 
@@ -225,6 +229,44 @@ def director_text(search: SearchRecord) -> str:
         f"could have prevented: {director.learned:.2f} as the director decides that learns from "
         f"earlier flights, {director.shipped:.2f} with the weights that ship, {director.rule:.2f} "
         f"by the fixed rule, {director.best:.2f} at best{seen if director.seen else ''}"
+    )
+
+
+def strikes_text(search: SearchRecord) -> str:
+    """Return who let events strike; empty without events.
+
+    Such as ``who said when events strike: the learned director for 5, the rule (at 3 m) for 2,
+    their genes for 6``.
+    """
+    strikes = search.strikes
+    if strikes is None:
+        return ""
+    found = [
+        f"{name} for {count}"
+        for name, count in (
+            ("the learned director", strikes.director),
+            ("the rule (at 3 m)", strikes.rule),
+            ("their genes", strikes.gene),
+        )
+        if count
+    ]
+    return f"who said when events strike: {', '.join(found)}"
+
+
+def event_director_text(search: SearchRecord) -> str:
+    """Return how good the director of events was; empty without one.
+
+    Fewer than :data:`TELLING_NPCS` strikes say nothing.
+    """
+    found = search.event_director
+    if found is None or found.struck < TELLING_NPCS:
+        return ""
+    return (
+        f"what strikes of events in {found.flights} flights would have been worth, where 1 is a "
+        f"violation: {found.learned:.2f} as the director decides that learns from earlier flights, "
+        f"{found.rule:.2f} by the fixed rule (at 3 m), {found.best:.2f} at best; of {found.struck} "
+        f"that struck it expected {found.expected:.1f} to end with a violation, and "
+        f"{found.violated} did"
     )
 
 

@@ -1,4 +1,4 @@
-"""What each way to make scenarios found in a search, how the model did, who moved the NPCs."""
+"""What each way to make scenarios found, how the model did, who moved NPCs and events."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import How, Origin
 from pytest_garl.npcs.domain_policy import GRADED
 from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.scenarios.groups import EVENTS
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, MET, STORY_MOMENTS, story_of, waits_for_decision
 from pytest_garl.search.model import PROPERTIES, proximities
@@ -78,6 +79,36 @@ class MoverRecord:
     policy: int
     interfering: int
     directed: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StrikeRecord:
+    """Who says when the events of a search strike: numbers of events.
+
+    ``director`` is the one that learned from the flights, ``rule`` the fixed rule in its place, and
+    ``gene`` a moment and a delay of the scenario.
+    """
+
+    director: int
+    rule: int
+    gene: int
+
+
+def strike_record(flown: Iterable[tuple[LedgerFlight, bool]]) -> StrikeRecord | None:
+    """Return who let events strike; None if no flight has an event.
+
+    Of each flight is said whether learned weights decide in it.
+    """
+    counts: Counter[str] = Counter()
+    for flight, has_learned in flown:
+        scenario = parse_scenario(flight.scenario)
+        acting = {key.partition(".")[0] for key, _ in scenario.genes} & {*EVENTS}
+        decided = acting & {*scenario.decided_events}
+        counts["director" if has_learned else "rule"] += len(decided)
+        counts["gene"] += len(acting) - len(decided)
+    if not counts.total():
+        return None
+    return StrikeRecord(director=counts["director"], rule=counts["rule"], gene=counts["gene"])
 
 
 def movers_in(scenario: Scenario, npcs: PolicySpec) -> Iterator[tuple[Mover, bool]]:

@@ -8,11 +8,18 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from pytest_garl.scenarios.genes import SUN
-from pytest_garl.scenarios.groups import GROUPS, QUANTITIES, WEATHER, WEATHER_CAUSES
+from pytest_garl.scenarios.groups import (
+    DECIDED,
+    EVENT_MOMENTS,
+    GROUPS,
+    QUANTITIES,
+    WEATHER,
+    WEATHER_CAUSES,
+)
 from pytest_garl.scenarios.light import sun_elevation_deg
 from pytest_garl.scenarios.quantities import UNITS, Group, Quantity, significant, unit_of
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.story import when_in_words
+from pytest_garl.scenarios.story import STORY_MOMENTS, when_in_words
 from pytest_garl.scenarios.units import TURN
 
 LIGHT_GROUP = "light"
@@ -70,8 +77,11 @@ def active_conditions(scenario: Scenario) -> tuple[ActiveCondition, ...]:
 def _when(scenario: Scenario, group: str) -> str:
     """Return when an event begins, empty if its time counts from the start of the flight."""
     key = f"{group}.after"
-    moment = int(QUANTITIES[key].flown(scenario[key])) if key in QUANTITIES else 0
-    return when_in_words(moment, scenario[f"{group}.from_s"]) if moment else ""
+    number = int(QUANTITIES[key].flown(scenario[key])) if key in QUANTITIES else 0
+    if not number:
+        return ""
+    delay_s = 0.0 if EVENT_MOMENTS[number] == DECIDED else scenario[f"{group}.from_s"]
+    return when_in_words(STORY_MOMENTS.index(EVENT_MOMENTS[number]), delay_s)
 
 
 _CAUSE_OF_WEATHER = {

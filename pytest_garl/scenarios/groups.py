@@ -16,6 +16,10 @@ through a height; its touchdown; the first picture in which the marker could be 
 first time in which it could (:mod:`pytest_garl.simulation.landing_moments`)."""
 DESCENT = MOMENTS[:4]
 """Those that the UAV's height tells."""
+DECIDED = "decided"
+EVENT_MOMENTS = (*MOMENTS, DECIDED)
+"""What an event waits for: a moment of the landing, or the decision of the learned director, in
+flight (:mod:`pytest_garl.simulation.strikes`)."""
 FOG_VISIBILITY_M = 10.0
 """Gene 1: below 10 m were reported in the Great Smog of London, 1952."""
 DUST_VISIBILITY_M = 20.0
@@ -215,9 +219,9 @@ def _after(event: str) -> Quantity:
         key=f"{event}.after",
         even=True,
         low=0.0,
-        high=len(MOMENTS) - 1.0,
+        high=len(EVENT_MOMENTS) - 1.0,
         whole=True,
-        choices=MOMENTS,
+        choices=EVENT_MOMENTS,
         meaning="the moment of the landing from which from_s counts",
         source="what goes wrong depends on what the UAV does when it happens, not on the clock",
     )
@@ -229,7 +233,7 @@ def _begin(event: str) -> Quantity:
         even=True,
         low=0.0,
         high=300.0,
-        meaning="when it begins, after its moment",
+        meaning="when it begins, after its moment; it does not count if the director decides",
         source="a landing takes some 10 to 40 s",
     )
 
@@ -603,3 +607,5 @@ QUANTITIES: dict[str, Quantity] = {
     each.key: each for group in GROUPS.values() for each in group.quantities
 }
 """Their quantities by key."""
+EVENTS = tuple(name for name in GROUPS if f"{name}.after" in QUANTITIES)
+"""The groups that begin at a moment of the landing."""

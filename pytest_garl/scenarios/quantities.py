@@ -96,10 +96,14 @@ class Quantity:
         return self.low / value if self.scale == "inverse" else value / self.high
 
     def flown(self, value: float) -> float:
-        """Return what is flown for a value: a whole one is rounded, a choice rounded up."""
-        if self.whole:
-            return float(round(value))
-        return float(math.ceil(value)) if self.choices else value
+        """Return what is flown for a value: a whole one is rounded, a choice rounded up.
+
+        A number beyond the last choice stands for that, so that a genome can draw it more often.
+        """
+        if not self.whole and not self.choices:
+            return value
+        number = float(round(value) if self.whole else math.ceil(value))
+        return min(number, len(self.choices) - 1.0) if self.choices else number
 
     def text_of(self, value: float) -> str:
         """Return a value for a reader: the name of a choice, or the number."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.groups import QUANTITIES
+from pytest_garl.scenarios.groups import DECIDED, EVENT_MOMENTS, QUANTITIES
 from pytest_garl.scenarios.task import Task
 
 MARKER_PLACE = ("marker.x", "marker.y")
@@ -57,6 +57,16 @@ class Scenario:
     def has_moved_marker(self) -> bool:
         """Whether the marker is not at its nominal place."""
         return any(self.get(key, 0.0) != 0 for key in MARKER_PLACE)
+
+    @property
+    def decided_events(self) -> tuple[str, ...]:
+        """The groups whose event the director lets strike in flight."""
+        return tuple(
+            key.partition(".")[0]
+            for key, value in self.genes
+            if key.endswith(".after")
+            and EVENT_MOMENTS[int(QUANTITIES[key].flown(value))] == DECIDED
+        )
 
     def replace(self, values: Mapping[str, float]) -> Scenario:
         """Return a copy in which the named properties have other values."""

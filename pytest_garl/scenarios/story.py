@@ -9,13 +9,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pytest_garl.scenarios.groups import MOMENTS
+from pytest_garl.scenarios.groups import DECIDED, MOMENTS
 from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 
 GRADES = ("careless", "curious", "chasing", "hostile")
 """Grades of behaviour from the weakest to the strongest (:mod:`pytest_garl.npcs.grades`)."""
-MET, DECIDED = "met", "decided"
+MET = "met"
 STORY_MOMENTS = (*MOMENTS, MET, DECIDED)
 """What a story waits for: a moment of the landing; the last one at which the NPC can still reach
 the UAV before that is down where the NPC is; or the decision of the learned director

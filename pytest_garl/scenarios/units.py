@@ -80,9 +80,13 @@ def sections_of(scenario: Scenario, map: Map) -> dict[str, dict[str, float]]:
         told = story_values(scenario, name, kinds[name])
         values |= {key: round(value, PLACE_DIGITS) + 0.0 for key, value in told.items()}
         sections[name] = values
+    decided = scenario.decided_events
     for key, value in scenario.genes:
         if key in QUANTITIES and key != TURN:
             head, _, name = key.partition(".")
+            if name == "from_s" and head in decided:
+                # The director decides, so that no delay counts.
+                continue
             digits = significant(QUANTITIES[key].flown(value))
             sections.setdefault(head, {})[name] = digits
     return {name: values for name, values in sections.items() if values}

@@ -78,6 +78,6 @@ class Breeder:
             objectives = self._method.tell(flown)
             self._ledger.note_objectives(self._search, self._next_told, objectives)
             if self._lessons is not None:
-                progress = self._lessons.learn(self._next_told, [text for text, _ in generation])
+                progress = self._lessons.learn(self._next_told, generation)
                 self._ledger.facts.note_progress(self._search, self._next_told, progress)
             self._next_told += 1

@@ -14,12 +14,30 @@ from typing import TYPE_CHECKING, Any
 from pytest_garl.airframe import Airframe
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.job import FlightJob, parse_job
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.separate_process import AskedProcess, answer_questions
 from pytest_garl.files.json_values import dataclass_from
-from pytest_garl.npcs.director_progress import DirectorProgress
+from pytest_garl.npcs.director_progress import Outcome, Progress
+from pytest_garl.search.objectives import near_miss
 
 if TYPE_CHECKING:
-    from pytest_garl.npcs.own_director import OwnDirector
+    from pytest_garl.npcs.search_directors import SearchDirectors
+
+
+BODY_WORTH = 0.25
+"""Worth of a collision with a moving body: nobody may have been able to prevent it, and who moved
+that body decided as well."""
+NEAR_MISS_WORTH = 0.1
+"""Worth of a flight that violates nothing by a hair: the smallest margin decides where nothing
+happens."""
+
+
+def outcome_of(result: FlightResult) -> Outcome:
+    """Return what a director of events learns of the end of a flight."""
+    verdict = result.verdict
+    if verdict.violation:
+        return Outcome(violates=True, worth=BODY_WORTH if verdict.violation_type == "IV" else 1.0)
+    return Outcome(violates=False, worth=NEAR_MISS_WORTH * near_miss(result)[1])
 
 
 class Teacher(AskedProcess):
@@ -39,39 +57,40 @@ class Lessons:
             "job": job.dumps(),
             "airframe": dataclasses.asdict(airframe),
         }
-        self._flown: list[Sequence[tuple[str, str]]] = []
-        """Scenario and record of the flights of each generation."""
+        self._flown: list[Sequence[tuple[str, str, dict[str, Any]]]] = []
+        """Scenario, record and outcome of the flights of each generation."""
         self.director = ""
         """The weights; empty for those that ship, until a flight taught something."""
 
-    def learn(self, generation: int, scenarios: Sequence[str]) -> DirectorProgress:
-        """Learn from the flights of a generation, by their scenarios in text, in slot order."""
+    def learn(self, generation: int, flown: Sequence[tuple[str, FlightResult | None]]) -> Progress:
+        """Learn from the flights of a generation: their scenarios in text, in slot order."""
         map, records = self._job.map, []
-        for index, text in enumerate(scenarios):
+        for index, (text, result) in enumerate(flown):
             slot = Slot(generation=generation, index=index)
             record = self._job.record(FlightId(search=self._search, map=map, slot=slot))
-            if record.is_file():
-                records.append((text, str(record)))
+            if record.is_file() and result is not None:
+                outcome = dataclasses.asdict(outcome_of(result))
+                records.append((text, str(record), outcome))
         self._flown.append(records)
         # A process that was begun anew, after an interruption, learns all generations again.
         known = self._teacher.ask({**self._about, "flights": None})["generations"]
         for flights in self._flown[known:]:
             answer = self._teacher.ask({**self._about, "flights": flights})
         self.director = answer["director"]
-        return dataclass_from(DirectorProgress, answer["progress"])
+        return dataclass_from(Progress, answer["progress"])
 
 
 class _Pupils:
     """The directors of the searches, in the process that trains them."""
 
     def __init__(self) -> None:
-        self._directors: dict[str, OwnDirector] = {}
+        self._directors: dict[str, SearchDirectors] = {}
         self._generations: Counter[str] = Counter()
 
     def answer(self, question: dict[str, Any]) -> dict[str, Any]:
         """Learn from flights; without any, say how many generations a search has learned from."""
         from pytest_garl.flight.flight_file import load
-        from pytest_garl.npcs.own_director import OwnDirector
+        from pytest_garl.npcs.search_directors import SearchDirectors
         from pytest_garl.scenarios.files import parse_scenario
 
         search, flights = question["search"], question["flights"]
@@ -80,8 +99,11 @@ class _Pupils:
         if search not in self._directors:
             map = parse_job(question["job"]).load_map()
             airframe = dataclass_from(Airframe, question["airframe"])
-            self._directors[search] = OwnDirector(map, airframe)
-        flown = ((parse_scenario(text), load(Path(file))) for text, file in flights)
+            self._directors[search] = SearchDirectors(map, airframe)
+        flown = [
+            (parse_scenario(text), load(Path(file)), dataclass_from(Outcome, outcome))
+            for text, file, outcome in flights
+        ]
         progress = self._directors[search].learn(flown)
         self._generations[search] += 1
         return {

@@ -11,23 +11,27 @@ from pytest_garl.scenarios.scenario import Scenario
 class Moments(Protocol):
     """The moments of a landing: of one that is flown, or of its record."""
 
-    @property
-    def began_s(self) -> tuple[float, ...]:
-        """When each came, infinite for those that did not."""
+    def of_event(self, name: str) -> tuple[float, ...]:
+        """Return when each came for which an event may wait, infinite for those that did not."""
 
 
 class Beginning:
-    """When an event begins: a group's ``from_s`` after the moment that its ``after`` names."""
+    """When an event begins: a group's ``from_s`` after the moment that its ``after`` names.
+
+    If that is the decision of the director, it begins with this.
+    """
 
     def __init__(self, scenario: Scenario, group: str, moments: Moments) -> None:
         key = f"{group}.after"
+        self._group, self._moments = group, moments
         self._moment = int(QUANTITIES[key].flown(scenario[key]))
-        self._delay_s, self._moments = scenario[f"{group}.from_s"], moments
+        is_decided = group in scenario.decided_events
+        self._delay_s = 0.0 if is_decided else scenario[f"{group}.from_s"]
 
     @property
     def time_s(self) -> float:
         """The time of the flight; infinite if the moment has not come."""
-        return self._moments.began_s[self._moment] + self._delay_s
+        return self._moments.of_event(self._group)[self._moment] + self._delay_s
 
 
 class Event:

@@ -40,7 +40,7 @@ def fly(
     """
     began = time.perf_counter()
     placed = Placed(scenario, map or load_map(scenario.map))
-    loop = Loop(placed, system, npcs.make, time_limit_s, guard)
+    loop = Loop(placed, system, npcs.make, time_limit_s, guard, npcs.event_director())
     flight = dataclasses.replace(
         with_nominal_landing(loop.run(), placed, loop.camera),
         conditions=tuple(each.cause for each in active_conditions(scenario)),

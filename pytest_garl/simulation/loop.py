@@ -18,7 +18,13 @@ from pytest_garl.simulation.environment import changed
 from pytest_garl.simulation.ground_stays import GroundStays
 from pytest_garl.simulation.landing_place import what_lies_under
 from pytest_garl.simulation.navigation import Navigation
-from pytest_garl.simulation.npc_policy import DECISION_STEP_S, GeneChange, NpcPolicy, Situation
+from pytest_garl.simulation.npc_policy import (
+    DECISION_STEP_S,
+    EventDirector,
+    GeneChange,
+    NpcPolicy,
+    Situation,
+)
 from pytest_garl.simulation.physics.flight_control import NO_THRUST, FlightControl
 from pytest_garl.simulation.physics.make_world import make_world
 from pytest_garl.simulation.physics.npc import Npc
@@ -40,6 +46,7 @@ from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.rangefinder import Ranging
 from pytest_garl.simulation.recorder import Recorder
 from pytest_garl.simulation.sensors import Delivery, Sensors
+from pytest_garl.simulation.strikes import Strikes
 from pytest_garl.simulation.system_under_test.calls import StepGuard, SystemFailedError
 from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthObject
 from pytest_garl.simulation.system_under_test.mission import mission_for
@@ -61,6 +68,7 @@ class Loop:
         policy: Callable[[], NpcPolicy],
         time_limit_s: float,
         guard: StepGuard | None,
+        events: EventDirector | None = None,
     ) -> None:
         scenario, map = placed.scenario, placed.map
         self.scenario, self.map, self._placed = scenario, map, placed
@@ -80,6 +88,7 @@ class Loop:
         self._thrusts, self._command = begin_at_start(self._world, self._model, placed)
         self.recorder = Recorder(placed, self.npcs)
         self.moments = self.recorder.moments
+        self._strikes = Strikes(scenario, self.moments, events)
         stays = GroundStays(self.recorder, self._model, placed.marker_m, self._under)
         self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m, stays)
         self._control = FlightControl(self._model)
@@ -202,6 +211,8 @@ class Loop:
 
     def _move_npcs(self, tick: int, uav_m: Vector, uav_mps: Vector) -> None:
         if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
+            marker_m, view = self._placed.marker_m, self.recorder.last_view
+            self._strikes.decide(self.recorder.time_s, uav_m, uav_mps, marker_m, view)
             moves = [npc.decide(self.situation(npc)) for npc in self.npcs]
             self._change([change for move in moves for change in move.changes])
         for npc in self.npcs:

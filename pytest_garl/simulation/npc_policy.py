@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -140,6 +141,30 @@ def _is_change(each: object) -> bool:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Outlook:
+    """What a director of events is shown at a decision.
+
+    ``moments_s`` are the times at which the moments of the landing came so far, infinite for the
+    others.  ``is_readable`` is whether the marker could be read in the latest picture that the
+    landing system got.
+    """
+
+    time_s: float
+    uav_position_m: tuple[float, float, float]
+    uav_velocity_mps: tuple[float, float, float]
+    marker_position_m: tuple[float, float]
+    moments_s: tuple[float, ...]
+    is_readable: bool
+
+
+class EventDirector(Protocol):
+    """Decides in one flight when events strike; each flight has an instance of its own."""
+
+    def strikes(self, outlook: Outlook, waiting: Sequence[str]) -> Collection[str]:
+        """Return which of the events that wait strike now, at the next decision of the flight."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PolicySpec:
     """Names a policy so that a worker process can make it and a ledger can compare it.
 
@@ -176,6 +201,11 @@ class PolicySpec:
     def decides_begin(self) -> bool:
         """Whether it decides when an NPC begins whose story waits for that."""
         return bool(getattr(self._load(), "decides_begin", False))
+
+    def event_director(self) -> EventDirector | None:
+        """Return what decides in one flight when events strike; None if the fixed rule does."""
+        make = getattr(self._load(), "event_director", None)
+        return make(**dict(self.arguments)) if make else None
 
     def directed_by(self, director: str) -> PolicySpec:
         """Return the policy with another director, if it decides when NPCs begin."""

@@ -25,8 +25,9 @@ from pytest_garl.flight.flight import (
     Track,
 )
 from pytest_garl.landing_system import Command
+from pytest_garl.scenarios.groups import DECIDED
 from pytest_garl.scenarios.placed import Placed
-from pytest_garl.scenarios.story import DECIDED, MET
+from pytest_garl.scenarios.story import MET
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.landing_moments import LandingMoments, moment_of
@@ -118,6 +119,11 @@ class Recorder:
     def last_contact(self) -> str | None:
         """Name of the body that the UAV touched last."""
         return self._contacts[-1].body if self._contacts else None
+
+    @property
+    def last_view(self) -> MarkerView | None:
+        """What the latest picture that the landing system got shows of the marker."""
+        return self._steps[-1].marker if self._steps else None
 
     def event(self, name: str, text: str) -> None:
         """Record an event."""

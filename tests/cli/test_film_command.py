@@ -98,7 +98,7 @@ def test_a_film_may_show_the_last_seconds_as_a_gif(run: Path) -> None:
 def test_another_ledger_has_its_records_beside_it(run: Path, tmp_path: Path) -> None:
     shutil.move(run / ".garl", tmp_path / "ci")
     assert "there is no ledger at .garl/ledger.sqlite; run a search first" in refused(SLOT)
-    drawn(SLOT, "--ledger=ci/ledger.sqlite")
+    drawn(SLOT, "--ledger=ci/ledger.sqlite", "--last=1")
 
 
 def test_a_simulator_of_a_users_own_has_no_film(
@@ -130,9 +130,9 @@ def test_a_record_finds_the_ledger_of_its_run(
     record = run / ".garl" / "flights" / f"01234567-{SLOT}.npz"
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    drawn(record, "-o", "it.mp4")
+    drawn(record, "-o", "it.mp4", "--last=1")
     shutil.move(run / ".garl" / "ledger.sqlite", run / ".garl" / "repeat.sqlite")
-    drawn(record, "-o", "it.mp4")
+    drawn(record, "-o", "it.mp4", "--last=1")
     assert "there is no ledger at nowhere.sqlite" in refused(record, "--ledger=nowhere.sqlite")
 
 
@@ -222,7 +222,9 @@ def test_without_an_encoder_nothing_is_flown(case: Path, monkeypatch: pytest.Mon
     assert "flying" not in error
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.long)]
+)
 def test_a_film_that_is_interrupted_leaves_nothing(run: Path, number: int) -> None:
     start = "from pytest_garl.cli import main; main()"
     command = [sys.executable, "-c", start, "film", SLOT]

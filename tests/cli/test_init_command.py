@@ -66,10 +66,50 @@ def test_a_script_gets_a_test_that_starts_it(folder: Path) -> None:
     done = init("my lander.py")
     assert done.exit_code == 0, done.output
     written = (folder / "tests" / "test_my_lander.py").read_text()
-    assert "python '../my lander.py'" in written
+    assert """CompanionProgram(\n    "python 'my lander.py'",\n    folder="..",\n""" in written
     assert "system=lander" in written
     assert "test_completes_the_mission[court-g00-s00]" in collected(folder)
-    assert "there is no file gone.py" in init("gone.py").output
+
+
+@pytest.mark.parametrize(
+    "line", ["python lander.py --speed 2 {marker_id}", "./lander.py -v", 'python3 -m lander "a b"']
+)
+def test_the_line_that_starts_a_program_is_taken_with_its_arguments(
+    folder: Path, line: str
+) -> None:
+    pytest.importorskip("pymavlink")
+    (folder / "lander.py").write_text("import nothing_that_is_here")
+    done = init(line)
+    assert done.exit_code == 0, done.output
+    assert "    garl check test_lander.py\n" in done.output
+    assert "    pytest --garl-budget=40 test_lander.py\n" in done.output
+    assert "test_completes_the_mission[court-g00-s00]" in collected(folder)
+    before = contents(folder)
+    again = init(line)
+    assert again.output.count("unchanged") == 3
+    assert "    garl check test_lander.py\n" in again.output
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("gone.py", "there is no file 'gone.py' in"),
+        ("python gone.py -v", "there is no file 'gone.py' in"),
+        ("lander.py {marker}", "found {marker}, expected one of"),
+        ("venv/bin/python lander.py", "there is no Python 'venv/bin/python'"),
+        ("cargo run", "expected a Python script"),
+        ("python 'lander.py", "No closing quotation"),
+    ],
+)
+def test_a_line_that_starts_nothing_is_refused_and_nothing_is_written(
+    folder: Path, line: str, message: str
+) -> None:
+    (folder / "lander.py").write_text("import nothing_that_is_here")
+    done = init(line)
+    assert done.exit_code != 0
+    assert message in done.output
+    assert {*contents(folder)} == {"lander.py"}
 
 
 def test_second_call_changes_nothing(folder: Path) -> None:

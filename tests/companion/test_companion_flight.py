@@ -227,12 +227,14 @@ def test_nothing_of_a_program_is_left_after_its_flight(tmp_path: Path) -> None:
     text = """
         import os, subprocess, time
         child = subprocess.Popen(["sleep", "100"])
-        print("left", os.getpid(), child.pid)
+        daemon = "sleep 100 >/dev/null 2>&1 & echo $!"
+        daemon = subprocess.run(["setsid", "sh", "-c", daemon], stdout=subprocess.PIPE)
+        print("left", os.getpid(), child.pid, daemon.stdout.decode())
         time.sleep(100)
     """
     said = notes(fly_still(program(tmp_path, text), 0.3))
     _, *pids = said.split()
-    assert all(_is_gone(pid) for pid in pids[:2])
+    assert all(_is_gone(pid) for pid in pids[:3])
 
 
 def _is_gone(pid: str) -> bool:
@@ -243,6 +245,12 @@ def _is_gone(pid: str) -> bool:
             return True
         time.sleep(0.02)
     return False
+
+
+def _old_python(folder: Path) -> str:
+    file = script(folder, "#!/bin/sh\necho 3.8\n", "python3.8")
+    file.chmod(0o755)
+    return str(file)
 
 
 BAD: dict[str, tuple[Callable[[Path], object], str]] = {
@@ -264,6 +272,18 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
     "no python": (
         lambda folder: program(folder, "", python="venv/bin/python").check(),
         "there is no Python 'venv/bin/python'",
+    ),
+    "no Python": (
+        lambda folder: program(folder, "", python="/bin/ls").check(),
+        "there is no Python '/bin/ls'; expected 3.9 or later",
+    ),
+    "an old Python": (
+        lambda folder: program(folder, "", python=_old_python(folder)).check(),
+        "found Python 3.8 as",
+    ),
+    "vehicle": (
+        lambda folder: program(folder, "", vehicle="copter"),
+        "(vehicle='copter'): expected ArduCopter(...) or",
     ),
     "brace": (
         lambda folder: program(folder, "", "python lander.py {marker}").check(),

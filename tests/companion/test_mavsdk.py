@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,12 +22,48 @@ from pytest_garl.search.probes import clear_scenario
 from pytest_garl.simulation.fly import fly
 from pytest_garl.vehicle.autopilot import ArduCopter
 from pytest_garl.vehicle.px4 import Px4Copter
-from tests.companion.processes import script
+from tests.companion.processes import running, script
 
 PYTHON = os.environ.get("DRONEKIT_PYTHON")
-pytestmark = pytest.mark.skipif(
-    PYTHON is None, reason="needs mavsdk in a Python of its own: run make test-dronekit"
-)
+VALUES = """
+    import enum
+
+    class Named:
+        def __init__(self, *values):
+            self.values = values
+    class ActionResult(Named):
+        Result = enum.Enum("Result", "COMMAND_DENIED TIMEOUT")
+    class ActionError(Exception):
+        pass
+    class Position(Named):
+        pass
+    class VelocityBodyYawspeed:
+        forward_m_s, right_m_s, down_m_s, yawspeed_deg_s = 1.0, 0.0, 0.5, 90.0
+"""
+"""In place of MAVSDK's package: the classes that these calls take and return."""
+CALLS = """
+    import asyncio
+    from mavsdk import System, action, offboard
+
+    async def main():
+        drone = System()
+        await drone.connect("udp://:14540")
+        async for position in drone.telemetry.position():
+            print(position.values)
+            break
+        await drone.offboard.set_velocity_body(offboard.VelocityBodyYawspeed())
+        try:
+            await drone.action.arm()
+        except action.ActionError as error:
+            result, origin = error.args
+            print(result.values[0].name, origin)
+        try:
+            drone.gimbal.set_angles
+        except NotImplementedError as error:
+            print(error)
+
+    asyncio.run(main())
+"""
 LANDER = """
 import asyncio, sys
 from mavsdk import System
@@ -79,6 +117,35 @@ asyncio.run(main())
 """
 
 
+def test_calls_of_mavsdk_become_messages_and_messages_become_values(tmp_path: Path) -> None:
+    (tmp_path / "mavsdk").mkdir()
+    script(tmp_path, "", "mavsdk/__init__.py")
+    for name in ("action", "offboard", "telemetry"):
+        script(tmp_path, VALUES, f"mavsdk/{name}.py")
+    d: Any = importlib.import_module("pymavlink.dialects.v20.ardupilotmega")
+    vehicle = d.MAVLink(None, srcSystem=1, srcComponent=1)
+    beat = d.MAVLink_heartbeat_message(2, 3, 209, 4, 4, 3).pack(vehicle)
+    place = 470_000_000, 80_000_000, 590_000, 6_000
+    told = d.MAVLink_global_position_int_message(0, *place, 0, 0, 0, 0).pack(vehicle)
+    with running(tmp_path, CALLS) as simulator:
+        simulator.fly(0.5)
+        simulator.fly(4.0, data=beat + told)
+        assert simulator.failure == ""
+        assert simulator.printed.splitlines()[:2] == ["(47.0, 8.0, 590.0, 6.0)", "TIMEOUT arm()"]
+        assert "System.gimbal.set_angles of MAVSDK is not there" in simulator.printed
+    heard = d.MAVLink(None).parse_buffer(simulator.sent)
+    kinds = [each.get_type() for each in heard]
+    assert kinds.count("COMMAND_LONG") == 1
+    assert kinds.count("HEARTBEAT") in (4, 5)
+    setpoints = [each for each in heard if each.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
+    # The server repeats it at 20 Hz while the program waits for the acknowledgement.
+    assert 55 < len(setpoints) < 70
+    last = setpoints[-1]
+    assert (last.coordinate_frame, last.type_mask) == (d.MAV_FRAME_BODY_NED, 0x5C7)
+    assert (last.vx, last.vz, round(last.yaw_rate, 2)) == (1.0, 0.5, 1.57)
+
+
+@pytest.mark.skipif(PYTHON is None, reason="needs mavsdk's package: run make test-dronekit")
 @pytest.mark.parametrize(
     ("vehicle", "parameter"),
     [(ArduCopter(), "LAND_SPEED"), (Px4Copter(), "RTL_RETURN_ALT")],

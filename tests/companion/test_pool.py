@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+
 import pytest
 
-from tests.companion.test_companion_flight import HEADER
-from tests.support.landing_project import result_hash, run
+from pytest_garl.errors import LandingSystemError
+from pytest_garl.execution.local_pool import temporary_pool
+from pytest_garl.execution.on_demand import fly_all
+from pytest_garl.execution.reference import BUILT_IN
+from pytest_garl.npcs.policy_catalogue import policy_spec
+from pytest_garl.scenarios.task import Start
+from pytest_garl.testing import check_landing_system
+from tests.companion.misbehaving import FINDINGS, NONDETERMINISTIC, PROGRAMS, left_running
+from tests.execution.flying import LAWN, job_of, scenario
+from tests.support.landing_project import run
 
 pytestmark = pytest.mark.long
+CALM = scenario().without(*(name for name, _ in LAWN.present_objects))
+HOVER = dataclasses.replace(
+    CALM, task=dataclasses.replace(CALM.task, start=Start(mode="hover", height_m=2.0))
+)
 TEST = """
 import pytest
 from pytest_garl import Camera, CompanionProgram
@@ -20,14 +35,6 @@ pytestmark = pytest.mark.garl(
 def test_lands(landing):
     assert landing.time_to_landing_s <= 60
 """
-LANDS = f"""{HEADER}
-import threading
-threading.Thread(target=lambda: [link.recv_match(blocking=True) for _ in range(100)]).start()
-import cv2
-cv2.VideoCapture(0).read()
-time.sleep(0.5)
-link.set_mode("LAND")
-"""
 
 
 def project(pytester: pytest.Pytester, text: str) -> None:
@@ -35,30 +42,44 @@ def project(pytester: pytest.Pytester, text: str) -> None:
     (pytester.path / "test_it.py").write_text(TEST)
 
 
-def test_one_worker_and_two_record_the_same_bytes(pytester: pytest.Pytester) -> None:
-    project(pytester, LANDS)
-    hashes = []
-    for workers in (1, 2):
-        result = run(pytester, "--garl-budget=4", f"--garl-workers={workers}", "-q")
-        assert "error" not in result.parseoutcomes()
-        hashes.append(result_hash(pytester))
-    assert hashes[0] == hashes[1]
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("while True: pass", "*computes without waiting for anything, at File*lander.py*, line 1*"),
-        ("import os, signal\nos.kill(os.getppid(), signal.SIGKILL)", "*"),
-    ],
-    ids=["hangs", "kills its parent"],
-)
-def test_a_program_that_hangs_or_kills_its_parent_does_not_end_the_run(
-    pytester: pytest.Pytester, text: str, said: str
-) -> None:
-    project(pytester, text)
+def test_the_report_of_a_program_that_hangs_has_its_line(pytester: pytest.Pytester) -> None:
+    project(pytester, "while True: pass")
     result = run(
-        pytester, "--garl-budget=2", "--garl-workers=1", "--garl-timeout=1", "-p", "no:randomly"
+        pytester, "--garl-budget=2", "--garl-workers=1", "--garl-timeout=4", "-p", "no:randomly"
     )
     assert result.ret == pytest.ExitCode.TESTS_FAILED
+    said = "*computes without waiting for anything, at File*lander.py*, line 1*"
     result.stdout.fnmatch_lines([said, "*2 flights*"])
+
+
+def test_nothing_that_programs_do_ends_the_run_or_outlives_it(tmp_path: Path) -> None:
+    shared = Path("/dev/shm")
+    before = {*shared.iterdir()} if shared.is_dir() else set()
+    found, hashes = {}, set()
+    with temporary_pool(1) as both:
+        for name, program in PROGRAMS.items():
+            job = dataclasses.replace(
+                job_of(program, tmp_path, timeout_s=5.0),
+                simulator=BUILT_IN,
+                npcs=policy_spec("stationary"),
+            )
+            (done,) = fly_all(*both, job, [HOVER])
+            assert left_running() == []
+            if name in FINDINGS:
+                found[name] = done.signature
+            else:
+                assert done.result.crash is None, name
+                hashes.add(done.sha256)
+    assert found == FINDINGS
+    assert len(hashes) == 1
+    assert {each for each in shared.glob("*") if each not in before} == set()
+
+
+@pytest.mark.parametrize("name", NONDETERMINISTIC)
+def test_a_program_that_flies_otherwise_each_time_is_named(name: str) -> None:
+    program, start = NONDETERMINISTIC[name], Start(mode="hover", height_m=2.0)
+    differs = f"{name}: two flights of the same scenario differ, first at .* s; if that is intended"
+    with pytest.raises(LandingSystemError, match=differs):
+        check_landing_system(program, start=start, seconds=2.0)
+    check = check_landing_system(program, start=start, seconds=2.0, deterministic=False)
+    assert any(f"{name}: two flights of the same scenario" in each for each in check.warnings)

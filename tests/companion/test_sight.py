@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.companion.processes import board_picture, gradient, running
+from tests.companion.processes import board_picture, gradient, running, script
 
 
 @pytest.mark.parametrize("source", ["0", "'rtsp://camera/stream'", "'v4l2src ! appsink', 1800"])
@@ -87,6 +87,26 @@ def test_detectors_that_are_made_for_each_picture_leave_pythons_memory_whole(
     """
     with running(tmp_path, text) as simulator:
         assert simulator.fly(0.1).printed == "15000\n"
+
+
+def test_tags_that_a_detector_of_apriltags_returns_are_told(tmp_path: Path) -> None:
+    module = """
+        import numpy as np
+        class Tag:
+            tag_id, corners = 7, np.array([[16, 8], [48, 8], [48, 40], [16, 40]])
+        class Detector:
+            def detect(self, image):
+                return [Tag()]
+    """
+    script(tmp_path, module, "apriltag.py")
+    text = """
+        import apriltag
+        import numpy as np
+        print(len(apriltag.Detector().detect(np.zeros((48, 64), np.uint8))))
+    """
+    with running(tmp_path, text) as simulator:
+        assert simulator.fly(0.1).printed == "1\n"
+        assert simulator.found == [(7, [(8, 4), (24, 4), (24, 20), (8, 20)])]
 
 
 def test_a_program_that_looks_for_opencv_before_its_import_has_the_camera(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Command, Diagnostics, Land, Observation, PositionSetpoint
 from pytest_garl.npcs.policy_catalogue import policy_spec
+from pytest_garl.scenarios.groups import EVENT_MOMENTS
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import LAWN, Good, job_of, scenario
@@ -81,6 +82,23 @@ def test_flight_is_judged_and_its_record_saved(tmp_path: Path) -> None:
     assert result == judged(record, job.limits)
     assert (result.outcome, result.signature, result.crash) == ("landed", "", None)
     assert (record.sha256, record.wall_s) == (sha256, wall_s)
+
+
+def with_decision(*args: Any, **more: Any) -> Flight:
+    moments = (("start", 0.0), ("8 m", 2.0), ("3 m", 4.0), ("decided cover", 4.5))
+    return dataclasses.replace(tiny_simulator.fly(*args, **more), moments=moments)
+
+
+def test_what_a_violation_took_names_the_moment_at_which_an_event_struck(tmp_path: Path) -> None:
+    decided = float(EVENT_MOMENTS.index("decided"))
+    waits = scenario().replace({"cover.after": decided, "cover.lasts_s": 2.0})
+    job = dataclasses.replace(
+        job_of(Good, tmp_path), simulator=reference_to(with_decision), limits=Limits(time_s=0.001)
+    )
+    result, _, _ = fly_job(job, waits, FlightId(search="search", map="lawn"), None)
+    assert dict(result.decided) == {"cover.after": EVENT_MOMENTS.index("3 m"), "cover.from_s": 0.5}
+    assert result.severity is not None
+    assert "0.5 s after the UAV passes 3 m, lasts 2 s" in result.severity.values
 
 
 def test_flight_removes_the_record_of_an_earlier_attempt(tmp_path: Path) -> None:

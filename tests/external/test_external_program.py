@@ -159,7 +159,8 @@ def test_a_program_of_another_kind_is_a_finding(
 def test_nothing_of_a_flight_is_left(tmp_path: Path) -> None:
     """Neither the program, nor what it started, nor an open file."""
     mark = f"sleep-of-{tmp_path.name}"
-    starts = f"__import__('subprocess').Popen(['sh', '-c', 'exec sleep 99; : {mark}'])"
+    command = ["setsid", "sh", "-c", f"sh -c 'sleep 99; : {mark}' & exec true"]
+    starts = f"__import__('subprocess').run({command}, stdout=-3, stderr=-3)"
     before = len([*Path("/proc/self/fd").iterdir()])
     flight = flown(written(tmp_path, RISES.format(misbehaves=starts)))
     assert flight.crash is None
@@ -180,6 +181,7 @@ def test_a_program_that_never_ends_is_killed_when_the_flight_ends(tmp_path: Path
         (["lander-of-nobody"], "there is no program 'lander-of-nobody' on the PATH"),
         (["notes.txt"], "did you mean ./notes.txt?"),
         (["./notes.txt"], "is no executable file"),
+        (["python3", "-u", "lander.py"], "there is no file 'lander.py' in"),
     ],
 )
 def test_a_program_that_is_not_there_is_named_before_the_flight(
@@ -228,6 +230,11 @@ def test_what_decides_how_it_flies_is_part_of_its_sources(tmp_path: Path) -> Non
 def test_a_command_is_a_list_of_words() -> None:
     with pytest.raises(LandingSystemError, match="expected a list of words"):
         ExternalProgram("./lander")
+
+
+def test_its_environment_is_of_texts() -> None:
+    with pytest.raises(LandingSystemError, match="environment has 'SPEED': 2; expected texts"):
+        ExternalProgram(["./lander"], environment={"SPEED": 2})  # type: ignore[dict-item]
 
 
 def test_a_program_flies_on_linux_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

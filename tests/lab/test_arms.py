@@ -10,8 +10,9 @@ from pytest_garl.errors import GarlError
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.files import dump_scenario
+from pytest_garl.scenarios.groups import DECIDED
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.scenarios.story import DECIDED, STORY, STORY_MOMENTS
+from pytest_garl.scenarios.story import STORY, STORY_MOMENTS
 from pytest_garl.search.method import SearchPlan
 from tests.support.stories import scenario_with, walk
 

@@ -99,7 +99,7 @@ class Learner:
 def test_a_director_learns_one_generation_behind(
     arm: str, learned: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(one_search, "OwnDirector", Learner)
+    monkeypatch.setattr(one_search, "SearchDirectors", Learner)
     directors = list[str]()
 
     def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[Flown]:

@@ -16,11 +16,12 @@ from pytest_garl.simulation.fly import fly
 
 @pytest.mark.sim
 @pytest.mark.parametrize("name", ["court", "lawn"])
-def test_it_lands_within_a_foot_in_clear_weather(name: str) -> None:
+@pytest.mark.parametrize("count", [2, pytest.param(4, marks=pytest.mark.long)])
+def test_it_lands_within_a_foot_in_clear_weather(name: str, count: int) -> None:
     map = dataclasses.replace(load_map(name), objects=())
     genome = genome_for(map)
     rng = np.random.default_rng(40)
-    for seed in range(4):
+    for seed in range(count):
         values = genome.nominal
         values[-2:] = rng.uniform(-1, 1, 2)
         scenario = repair(decode(values, genome, map=name, seed=seed), map)

@@ -186,14 +186,17 @@ def test_absent_npcs_take_part_in_no_flight(pytester: pytest.Pytester) -> None:
     assert all("velocity" not in scenario for scenario in scenarios)
 
 
-@pytest.mark.parametrize("args", [(), ("-n2",)], ids=["alone", "xdist"])
+@pytest.mark.parametrize(
+    "args", [(), pytest.param(("-n2",), marks=pytest.mark.long)], ids=["alone", "xdist"]
+)
 def test_case_outside_the_domain_is_flown_and_named(
     searched: pytest.Pytester, args: tuple[str, ...]
 ) -> None:
     (searched.path / "mine.toml").write_text('extends = "calm"\nnpc_behaviour = "absent"\n')
     inside = run_cases(searched, "--garl-workers=0")
     inside.stdout.no_fnmatch_line("*outside the domain*")
-    outside = run_cases(searched, "--garl-workers=1", "-o", "garl_domain=mine.toml", *args)
+    workers = "--garl-workers=1" if args else "--garl-workers=0"
+    outside = run_cases(searched, workers, "-o", "garl_domain=mine.toml", *args)
     assert outside.parseoutcomes() == inside.parseoutcomes()
     dogs = [
         line for line in outside.outlines if "outside the domain mine" in line and "dog" in line

@@ -51,6 +51,9 @@ HIDES_ENCODERS = "import sys\nsys.modules['imageio_ffmpeg'] = None\n"
 SEARCH = ("--garl-budget=2", "--garl-shrink=0", "--garl-workers=1")
 SIGNATURE = "V:ZeroDivisionError@stack_of_test.step"
 IN_PARALLEL = pytest.mark.parametrize("parallel", [(), ("-n2",)], ids=["alone", "n2"])
+LONG_IN_PARALLEL = pytest.mark.parametrize(
+    "parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)], ids=["alone", "n2"]
+)
 
 
 def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:
@@ -104,7 +107,7 @@ def test_each_kind_of_a_search_has_a_film_that_is_named_beside_it(
 
 
 @pytest.mark.sim
-@IN_PARALLEL
+@LONG_IN_PARALLEL
 def test_without_a_search_the_failed_cases_have_films(
     raising: pytest.Pytester, case: str, parallel: tuple[str, ...]
 ) -> None:
@@ -134,7 +137,7 @@ def _environment() -> dict[str, str]:
 
 
 @pytest.mark.sim
-@IN_PARALLEL
+@LONG_IN_PARALLEL
 def test_what_failed_before_a_stop_has_a_film(
     raising: pytest.Pytester, case: str, parallel: tuple[str, ...]
 ) -> None:
@@ -143,7 +146,7 @@ def test_what_failed_before_a_stop_has_a_film(
     assert f"case-{case}.mp4" in drawn(raising)
 
 
-@IN_PARALLEL
+@LONG_IN_PARALLEL
 def test_a_simulator_of_a_users_own_has_no_films(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:
@@ -162,7 +165,7 @@ def test_a_simulator_of_a_users_own_has_no_films(
 
 
 @pytest.mark.parametrize("ini", [False, True], ids=["option", "ini-key"])
-@IN_PARALLEL
+@LONG_IN_PARALLEL
 def test_without_an_encoder_nothing_is_flown(
     pytester: pytest.Pytester,
     monkeypatch: pytest.MonkeyPatch,
@@ -186,9 +189,7 @@ def test_without_an_encoder_nothing_is_flown(
     assert not (pytester.path / ".garl").exists()
 
 
-@pytest.mark.parametrize(
-    "parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)], ids=["alone", "n2"]
-)
+@LONG_IN_PARALLEL
 def test_an_interrupted_run_draws_nothing(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:

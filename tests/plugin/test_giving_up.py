@@ -152,7 +152,10 @@ def test_giving_up_is_allowed_by_the_limits(
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("system", REPORTS)
+@pytest.mark.parametrize(
+    "system",
+    ["AbortNow", pytest.param("HoverThenAbort", marks=pytest.mark.long), "TouchFarThenAbort"],
+)
 def test_needless_giving_up_is_red_in_the_real_simulator(
     pytester: pytest.Pytester, system: str
 ) -> None:

@@ -40,7 +40,7 @@ def test_header_says_where_it_flies_if_pytest_itself_cannot(pytester: pytest.Pyt
 
 
 def test_first_run_tells_the_time_when_it_knows_it(pytester: pytest.Pytester) -> None:
-    timed(pytester, 0.1, "['lawn', 'court']")
+    timed(pytester, 0.05, "['lawn', 'court']")
     args = ("--garl-budget=24", "--garl-workers=1", "-k", "test_collisions")
     first = pytester.runpytest_subprocess("-p", "no:cacheprovider", *args)
     first.stdout.fnmatch_lines(

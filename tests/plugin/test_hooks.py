@@ -20,7 +20,7 @@ def test_each_violation_fails_one_item_and_xfails_its_duplicates(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:
     project(pytester)
-    result = run(pytester, "--garl-budget=24", "--garl-workers=1", *parallel)
+    result = run(pytester, "--garl-budget=24", "--garl-workers=0", *parallel)
     outcomes = result.parseoutcomes()
     # Two mechanisms (a dog, and fog that misleads) fail once each.
     assert outcomes["failed"] == 2
@@ -33,17 +33,26 @@ def test_each_violation_fails_one_item_and_xfails_its_duplicates(
     result.stdout.fnmatch_lines(["* IV:dog:* pytest test_it.py --garl-repeat=lawn-g*"])
 
 
+IN_PYTEST, SPREAD = ("0",), ("2", "-n2", "--dist=worksteal")
+
+
+@pytest.mark.parametrize(
+    "ways",
+    [(IN_PYTEST, SPREAD), pytest.param((IN_PYTEST, ("1",), ("4",)), marks=pytest.mark.long)],
+    ids=["as xdist", "as more workers"],
+)
 def test_the_same_seed_gives_the_same_results_for_any_workers(
-    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, ways: tuple[tuple[str, ...], ...]
 ) -> None:
     project(pytester)
     hashes = set()
-    for args in (("0",), ("1",), ("4",), ("2", "-n2", "--dist=worksteal")):
+    for args in ways:
         # Nor does the order of sets change them.
         monkeypatch.setenv("PYTHONHASHSEED", f"1{args[0]}")
         run(pytester, "--garl-budget=16", f"--garl-workers={args[0]}", *args[1:])
         hashes.add(result_hash(pytester))
     assert len(hashes) == 1
+    monkeypatch.delenv("PYTHONHASHSEED")
     run(pytester, "--garl-budget=16", "--garl-workers=0", "--garl-seed=1")
     assert result_hash(pytester) not in hashes
 
@@ -113,7 +122,7 @@ def test_a_broken_system_is_a_finding_and_the_run_goes_on(
 
 def test_x_stops_at_the_first_failure(pytester: pytest.Pytester) -> None:
     project(pytester)
-    result = run(pytester, "--garl-budget=24", "--garl-workers=1", "-x")
+    result = run(pytester, "--garl-budget=24", "--garl-workers=0", "-x")
     assert result.parseoutcomes()["failed"] == 1
 
 

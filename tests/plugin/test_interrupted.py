@@ -57,37 +57,31 @@ def flown(pytester: pytest.Pytester) -> list[tuple[int, ...]]:
     )
 
 
-@pytest.fixture
-def searched(pytester: pytest.Pytester) -> pytest.Pytester:
+def test_resumed_finished_run_saves_what_is_missing_and_repeats_its_outcome(
+    pytester: pytest.Pytester,
+) -> None:
     project(pytester, "Good", "['lawn']")
     run(pytester, *SEARCH)
-    return pytester
-
-
-def test_resumed_run_saves_the_cases_that_a_kill_prevented(
-    searched: pytest.Pytester,
-) -> None:
-    saved, before = cases(searched.path), flown(searched)
+    saved, before = cases(pytester.path), flown(pytester)
     assert len(saved) > 1
+    # As a kill may have prevented.
     for name in list(saved)[1:]:
-        next(searched.path.glob(f"scenarios/**/{name}")).unlink()
-    assert run(searched, *SEARCH, "--garl-resume").ret == pytest.ExitCode.TESTS_FAILED
-    assert (cases(searched.path), flown(searched)) == (saved, before)
-
-
-def test_resumed_finished_run_repeats_its_outcome(searched: pytest.Pytester) -> None:
-    saved, before = cases(searched.path), flown(searched)
-    again = run(searched, *SEARCH, "--garl-resume")
-    assert again.ret == pytest.ExitCode.TESTS_FAILED
-    assert (cases(searched.path), flown(searched)) == (saved, before)
+        next(pytester.path.glob(f"scenarios/**/{name}")).unlink()
+    for _ in range(2):
+        again = run(pytester, *SEARCH, "--garl-resume")
+        assert again.ret == pytest.ExitCode.TESTS_FAILED
+        assert (cases(pytester.path), flown(pytester)) == (saved, before)
     again.stdout.fnmatch_lines(["*the same case is saved already*"])
+    less = run(pytester, *SEARCH, "--garl-shrink=10", "--garl-resume")
+    assert less.ret == pytest.ExitCode.TESTS_FAILED
+    less.stdout.no_fnmatch_line("*bred in another way*")
 
 
-@pytest.mark.parametrize("shrink", ["10", pytest.param("30", marks=pytest.mark.long)])
-def test_finished_run_resumes_with_more_or_less_shrinking(
-    searched: pytest.Pytester, shrink: str
-) -> None:
-    again = run(searched, *SEARCH, f"--garl-shrink={shrink}", "--garl-resume")
+@pytest.mark.long
+def test_finished_run_resumes_with_more_shrinking(pytester: pytest.Pytester) -> None:
+    project(pytester, "Good", "['lawn']")
+    run(pytester, *SEARCH)
+    again = run(pytester, *SEARCH, "--garl-shrink=30", "--garl-resume")
     assert again.ret == pytest.ExitCode.TESTS_FAILED
     again.stdout.no_fnmatch_line("*bred in another way*")
 

@@ -53,8 +53,15 @@ def fly(pytester: pytest.Pytester, systems: tuple[str, ...], end: str, workers: 
     return int(run(pytester, "--garl-budget=2", f"--garl-workers={workers}").ret)
 
 
-@pytest.mark.parametrize("workers", [0, 1])
-@pytest.mark.parametrize("end", ["", AT_IMPORT])
+@pytest.mark.parametrize(
+    ("workers", "end"),
+    [
+        (0, ""),
+        (1, AT_IMPORT),
+        pytest.param(1, "", marks=pytest.mark.long),
+        pytest.param(0, AT_IMPORT, marks=pytest.mark.long),
+    ],
+)
 def test_replaced_judge_is_no_use(pytester: pytest.Pytester, workers: int, end: str) -> None:
     assert fly(pytester, REPLACING, end, workers) == pytest.ExitCode.TESTS_FAILED
     found = stories(pytester.path)

@@ -84,7 +84,13 @@ def test_case_holds_the_worst_violation_of_its_search(searched: pytest.Pytester)
     assert dog.worst.grade == "hostile"
 
 
-@pytest.mark.parametrize("how", [("--garl-workers=0",), ("--garl-workers=2", "-n2")])
+@pytest.mark.parametrize(
+    "how",
+    [
+        ("--garl-workers=0",),
+        pytest.param(("--garl-workers=2", "-n2"), marks=pytest.mark.long),
+    ],
+)
 def test_known_case_excuses_no_worse_violation(
     searched: pytest.Pytester, how: tuple[str, ...]
 ) -> None:

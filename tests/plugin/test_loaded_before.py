@@ -88,7 +88,7 @@ def test_environment_does_not_change_what_a_search_breeds(
                 outside.delenv(name, raising=False)
             for name, value in setting.items():
                 outside.setenv(name, value)
-            run(pytester, "--garl-budget=32", "--garl-method=ga", "--garl-workers=1")
+            run(pytester, "--garl-budget=16", "--garl-method=ga", "--garl-workers=1")
         found.add(result_hash(pytester))
     assert len(found) == 1
 

@@ -71,7 +71,8 @@ def test_an_unknown_ini_key_is_one_usage_error_that_names_the_nearest(
         (("--garl-method=random",), "*NPCs waypoint,*"),
         (("--garl-method=surrogate-random",), "*NPCs dqn-paper,*"),
         (("--garl-method=ga",), "*NPCs destination,*"),
-        (("--garl-method=offline-rl",), "*NPCs destination,*"),
+        # PyTorch takes seconds to load.
+        pytest.param(("--garl-method=offline-rl",), "*NPCs destination,*", marks=pytest.mark.long),
         (("--garl-method=online-rl",), "*NPCs online-rl,*"),
         (("--garl-method=random", "--garl-npcs=stand"), "*NPCs stand,*"),
     ],

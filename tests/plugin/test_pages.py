@@ -11,7 +11,7 @@ import pytest
 
 from tests.support.landing_project import project, run
 
-SEARCH = ("--garl-budget=8", "--garl-workers=1")
+SEARCH = ("--garl-budget=8", "--garl-workers=0")
 
 
 def files(pytester: pytest.Pytester, folder: str) -> dict[str, bytes]:
@@ -24,7 +24,7 @@ def files(pytester: pytest.Pytester, folder: str) -> dict[str, bytes]:
 @pytest.mark.parametrize("workers", [(), ("-n2",)])
 def test_a_search_writes_its_pages(pytester: pytest.Pytester, workers: tuple[str, ...]) -> None:
     project(pytester)
-    result = run(pytester, "--garl-budget=8", "--garl-workers=1", "--garl-report=pages", *workers)
+    result = run(pytester, *SEARCH, "--garl-report=pages", *workers)
     result.stdout.fnmatch_lines(["*garl: report*", "pages/index.html: 2 pages, 0 films"])
     found = files(pytester, "pages")
     assert len(found) == 3
@@ -40,7 +40,7 @@ def test_the_ini_key_names_a_folder_below_the_root(pytester: pytest.Pytester) ->
     project(pytester)
     ini = pytester.path / "pytest.ini"
     ini.write_text(ini.read_text() + "garl_report = pages\n")
-    run(pytester, "--garl-budget=2", "--garl-workers=1")
+    run(pytester, "--garl-budget=2", "--garl-workers=0")
     assert "index.html" in files(pytester, "pages")
     shutil.rmtree(pytester.path / "pages")
     # Saved cases alone have nothing to report.
@@ -90,14 +90,6 @@ def test_junit_names_the_page_of_a_violation(
             assert f"[[ATTACHMENT|{page}]]" in "".join(case.itertext())
 
 
-def test_without_a_log_junit_has_no_attachment(pytester: pytest.Pytester) -> None:
-    project(pytester)
-    result = run(pytester, *SEARCH, "--garl-report=pages", "--junitxml=junit.xml")
-    assert junit(pytester)
-    assert "ATTACHMENT" not in (pytester.path / "junit.xml").read_text()
-    assert "ATTACHMENT" not in result.stdout.str()
-
-
 def test_summary_and_junit_link_to_the_published_report(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -105,10 +97,14 @@ def test_summary_and_junit_link_to_the_published_report(
     page, url = pytester.path / "summary.md", "https://example.org/nightly"
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
     published = ("--garl-report=pages", f"--garl-report-url={url}/", "--junitxml=junit.xml")
-    run(pytester, *SEARCH, *published)
+    result = run(pytester, *SEARCH, *published)
+    # Without a log JUnit has no attachment.
+    assert "ATTACHMENT" not in (pytester.path / "junit.xml").read_text() + result.stdout.str()
     text = page.read_text()
     assert f"[The whole report]({url}/index.html)" in text
-    for case in junit(pytester):
+    found = junit(pytester)
+    assert found
+    for case in found:
         address = properties(case)["garl.page"]
         assert address.startswith(f"{url}/kinds/")
         assert f"[page]({address})" in text

@@ -60,7 +60,7 @@ def no_marker(*args):
 
 probes.probes_for = no_marker
 """
-SEARCH = ("--garl-budget=1", "--garl-method=random", "--garl-workers=2")
+SEARCH = ("--garl-budget=1", "--garl-method=random", "--garl-workers=0")
 ITEM = "test_it.py::probes[{}]"
 
 

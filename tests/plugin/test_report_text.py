@@ -15,7 +15,7 @@ from tests.support.landing_project import project, run
 from tests.support.search_tests import HIT
 
 PARALLEL = pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
-SEARCH = ("--garl-budget=8", "--garl-workers=1", "-o", "garl_dir=elsewhere")
+SEARCH = ("--garl-budget=8", "--garl-workers=0", "-o", "garl_dir=elsewhere")
 AGAIN = (
     "Repeat: pytest 'test_it.py::test_collisions[lawn-g00-s02]' --garl-repeat=lawn-g00-s02 "
     "-o garl_dir=elsewhere"

@@ -45,7 +45,13 @@ def test_second_search_expects_saved_cases_and_saves_nothing(searched: pytest.Py
     assert saved(searched) == before
 
 
-@pytest.mark.parametrize("how", [("--garl-workers=1",), ("--garl-workers=2", "-n2")])
+@pytest.mark.parametrize(
+    "how",
+    [
+        pytest.param(("--garl-workers=1",), marks=pytest.mark.long),
+        ("--garl-workers=2", "-n2"),
+    ],
+)
 def test_same_search_saves_the_same_bytes(
     searched: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, how: tuple[str, ...]
 ) -> None:
@@ -183,7 +189,7 @@ DESCENT = """
 """
 
 
-@pytest.mark.parametrize("workers", ["0", "2"])
+@pytest.mark.parametrize("workers", ["0", pytest.param("2", marks=pytest.mark.long)])
 def test_what_a_collision_hid_is_flown_again_without_npcs_and_saved(
     pytester: pytest.Pytester, workers: str
 ) -> None:

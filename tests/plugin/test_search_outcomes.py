@@ -35,7 +35,7 @@ def test_crash_fails_an_item_although_the_first_is_skipped_or_xfailed(
     pytester: pytest.Pytester, first: str, parallel: tuple[str, ...]
 ) -> None:
     write_tests(pytester, "Raises", first + DISTANCE + COLLISIONS)
-    result = run(pytester, "--garl-budget=4", "--garl-workers=1", *parallel)
+    result = run(pytester, "--garl-budget=4", "--garl-workers=0", *parallel)
     found = result.parseoutcomes()
     assert (found["failed"], found.get("passed", 0), found.get("errors", 0)) == (1, 0, 0)
     assert result.ret == pytest.ExitCode.TESTS_FAILED
@@ -98,7 +98,7 @@ def test_xdist_fails_the_same_items(pytester: pytest.Pytester) -> None:
     alone = outcomes_of(run(pytester, *SEARCH_ALL), "FAILED")
     assert len(alone) == 2
     for how in ("worksteal", "loadscope"):
-        result = run(pytester, *SEARCH_ALL[:1], "--garl-workers=1", "-rf", "-n2", f"--dist={how}")
+        result = run(pytester, *SEARCH_ALL[:1], "--garl-workers=0", "-rf", "-n2", f"--dist={how}")
         assert outcomes_of(result, "FAILED") == alone
 
 
@@ -109,7 +109,7 @@ def test_each_parameter_of_a_test_fails_once(
     parametrised = DISTANCE.replace("landing)", "landing, limit_m)").replace("1.5", "limit_m")
     given = "\n@pytest.mark.parametrize('limit_m', [1.5, 2.0])"
     write_tests(pytester, "Good", given + parametrised)
-    result = run(pytester, *SEARCH_ALL[:1], "--garl-workers=1", "-rf", *parallel)
+    result = run(pytester, *SEARCH_ALL[:1], "--garl-workers=0", "-rf", *parallel)
     failed = outcomes_of(result, "FAILED")
     assert sorted(name.rpartition("-")[2] for name in failed) == ["1.5]", "2.0]"]
     if not parallel:

@@ -13,7 +13,7 @@ from tests.support.landing_project import project, run
 from tests.support.search_tests import HIT
 
 PARALLEL = pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
-SEARCH = ("--garl-budget=8", "--garl-workers=1", "-o", "garl_dir=elsewhere")
+SEARCH = ("--garl-budget=8", "--garl-workers=0", "-o", "garl_dir=elsewhere")
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_summary_counts_failures_of_users_properties_as_violations(
         "    return tiny_simulator.fly(scenario.replace(nominal), *args, **kwargs)\n"
         "def pytest_garl_fly(config): return calm\n"
     )
-    result = run(pytester, "--garl-budget=4", "--garl-workers=1", *parallel)
+    result = run(pytester, "--garl-budget=4", "--garl-workers=0", *parallel)
     result.assert_outcomes(failed=1, xfailed=3)
     result.stdout.fnmatch_lines(
         [
@@ -115,7 +115,7 @@ def test_summary_shows_what_the_random_flights_found(
     page = pytester.path / "summary.md"
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
     monkeypatch.setenv("COLUMNS", "120")
-    search = ("--garl-budget=12", "--garl-population=4", "--garl-workers=1", "--garl-shrink=0")
+    search = ("--garl-budget=12", "--garl-population=4", "--garl-workers=0", "--garl-shrink=0")
     result = run(pytester, *search, *parallel)
     few = "against random flights: too few random flights to say (4 of 20)"
     result.stdout.fnmatch_lines([f"  {few}", "*seen in * of 4 random flights"])
@@ -216,7 +216,7 @@ def test_lf_flies_only_the_failing_slots_again(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:
     project(pytester)
-    args = ("--garl-budget=24", "--garl-shrink=0", "--garl-workers=1", "-rf", *parallel)
+    args = ("--garl-budget=24", "--garl-shrink=0", "--garl-workers=0", "-rf", *parallel)
 
     def failed(result: pytest.RunResult) -> set[str]:
         return {line.split(" - ")[0] for line in result.outlines if line.startswith("FAILED")}
@@ -237,7 +237,7 @@ def test_junit_carries_properties_of_the_flight(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:
     project(pytester)
-    run(pytester, "--garl-budget=8", "--garl-workers=1", "--junitxml=out.xml", *parallel)
+    run(pytester, "--garl-budget=8", "--garl-workers=0", "--junitxml=out.xml", *parallel)
     cases = list(ElementTree.parse(Path(pytester.path) / "out.xml").iter("testcase"))
     assert len(cases) == 24
     for case in cases:

@@ -11,17 +11,31 @@ from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import Origin
-from pytest_garl.npcs.director_progress import DirectorProgress, total
+from pytest_garl.npcs.director_progress import (
+    DirectorProgress,
+    EventProgress,
+    total,
+    total_of_events,
+)
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.reports.run_record import SearchRecord
-from pytest_garl.reports.run_text import director_text, movers_text, origins_text
+from pytest_garl.reports.run_text import (
+    director_text,
+    event_director_text,
+    movers_text,
+    origins_text,
+    strikes_text,
+)
 from pytest_garl.reports.search_origins import (
     MoverRecord,
+    StrikeRecord,
     model_record,
     mover_record,
     origin_records,
+    strike_record,
 )
 from pytest_garl.scenarios.files import dump_scenario
+from pytest_garl.scenarios.groups import EVENT_MOMENTS
 from pytest_garl.scenarios.story import GRADES, STORY_MOMENTS
 from pytest_garl.search.model import PROPERTIES
 from pytest_garl.search.objectives import SAFE_MARGINS
@@ -189,4 +203,53 @@ def test_the_summary_says_how_good_the_director_was_in_all_generations() -> None
         "prevented: 0.25 as the director decides that learns from earlier flights, 0.10 with the "
         "weights that ship, 0.05 by the fixed rule, 0.50 at best; of 3 seen coming it expected "
         "1.5 to meet the UAV, and 2 did"
+    )
+
+
+def with_event(moment: str, event: str = "cover") -> LedgerFlight:
+    after = {f"{event}.after": EVENT_MOMENTS.index(moment), f"{event}.lasts_s": 2.0}
+    scenario = scenario_with("dog-1", (-8.0, 0.0), 2.0, {}).replace(after)
+    return dataclasses.replace(flight(0, 0), scenario=dump_scenario(scenario))
+
+
+def test_events_are_told_by_who_says_when_they_strike() -> None:
+    key = SearchKey(system="my_landing:Mine", map="lawn")
+    search = SearchRecord(key=key, name=key.place, flights=(), kinds=(), violating=0)
+    flown = [
+        (with_event("decided"), False),
+        (with_event("decided"), True),
+        (with_event("decided", "outage"), True),
+        (with_event("3 m"), True),
+        (with_event("start", "burst"), False),
+        (STORIES[0], True),
+    ]
+    found = strike_record(flown)
+    assert found == StrikeRecord(director=2, rule=1, gene=2)
+    assert strike_record(flown[5:]) is None
+    assert strikes_text(search) == ""
+    assert strikes_text(dataclasses.replace(search, strikes=found)) == (
+        "who said when events strike: the learned director for 2, the rule (at 3 m) for 1, their "
+        "genes for 2"
+    )
+
+
+def test_the_summary_says_how_good_the_director_of_events_was() -> None:
+    quiet = EventProgress(
+        flights=8, learned=0.1, rule=0.1, best=0.2, struck=0, expected=0, violated=0
+    )
+    first = dataclasses.replace(quiet, struck=4, expected=1.0, violated=2)
+    second = EventProgress(
+        flights=24, learned=0.3, rule=0.1, best=0.4, struck=8, expected=2.5, violated=2
+    )
+    assert total_of_events([quiet]) is None
+    key = SearchKey(system="m:S", map="lawn")
+    search = SearchRecord(key=key, name=key.place, flights=(), kinds=(), violating=0)
+    assert event_director_text(search) == ""
+    few = dataclasses.replace(search, event_director=total_of_events([first]))
+    assert event_director_text(few) == "", "too few to say"
+    told = dataclasses.replace(search, event_director=total_of_events([first, second]))
+    assert event_director_text(told) == (
+        "what strikes of events in 32 flights would have been worth, where 1 is a violation: 0.25 "
+        "as the director decides that learns from earlier flights, 0.10 by the fixed rule (at 3 "
+        "m), 0.35 at best; of 12 that struck it expected 3.5 to end with a violation, and 4 did"
     )

@@ -82,3 +82,5 @@ def test_an_event_that_waits_for_a_moment_says_when_it_begins() -> None:
     (tied,) = active_conditions(NOMINAL.replace(cover | {"cover.after": 5.0}))
     assert tied.named == "1.0 s after the marker can no longer be read, lasts 3 s, share 80 %"
     assert tied.values == timed.values
+    (decided,) = active_conditions(NOMINAL.replace(cover | {"cover.after": 6.0}))
+    assert decided.named == "when the director lets it go, lasts 3 s, share 80 %"

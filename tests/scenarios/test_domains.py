@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
 from collections import Counter
 from pathlib import Path
@@ -19,7 +20,7 @@ from pytest_garl.scenarios.domains.names import BUILT_IN
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import Genome, active_genes, genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
-from pytest_garl.scenarios.groups import GROUPS, QUANTITIES
+from pytest_garl.scenarios.groups import EVENT_MOMENTS, EVENTS, GROUPS, MOMENTS, QUANTITIES
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
@@ -43,6 +44,22 @@ def domain_with(folder: Path, text: str) -> Domain:
 
 def drawn(domain: Domain, count: int) -> list[Scenario]:
     return list(random_scenarios(COURT, genome_of(domain, COURT), 3, 0, count))
+
+
+@pytest.mark.parametrize(("behaviour", "share"), [("chasing", 0.5), ("careless", 0.0)])
+def test_half_of_the_events_wait_for_a_decision_where_npcs_may_interfere(
+    behaviour: str, share: float
+) -> None:
+    domain = dataclasses.replace(FIELD, npc_behaviour=behaviour)
+    moments = Counter(
+        EVENT_MOMENTS[int(QUANTITIES[f"{event}.after"].flown(scenario[f"{event}.after"]))]
+        for scenario in drawn(domain, 1500)
+        for event in EVENTS
+        if any(key.startswith(f"{event}.") for key, _ in scenario.genes)
+    )
+    assert moments.total() > 300
+    assert moments["decided"] / moments.total() == pytest.approx(share, abs=0.08)
+    assert {*moments} >= {*MOMENTS}
 
 
 def test_a_file_extends_a_domain_and_takes_away_groups_and_conditions(tmp_path: Path) -> None:

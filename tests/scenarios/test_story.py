@@ -122,5 +122,10 @@ def test_a_file_states_the_moment_of_an_event() -> None:
     assert 'after = "readable"' in text
     assert loads(text, LAWN) == scenario
     assert "after" not in dumps(repair(scenario.replace({"outage.after": 0.0}), LAWN), LAWN)
+    decided = repair(scenario.replace({"outage.after": 6.0}), LAWN)
+    text = dumps(decided, LAWN)
+    assert 'after = "decided"' in text
+    assert "from_s" not in text, "the director decides"
+    assert loads(text, LAWN) == decided
     with pytest.raises(ScenarioError, match="expected one of start, 8 m, 3 m, touchdown"):
-        loads(text.replace('"readable"', '"seen"'), LAWN)
+        loads(text.replace('"decided"', '"seen"'), LAWN)

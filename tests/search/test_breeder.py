@@ -9,7 +9,8 @@ import pytest
 from pytest_garl.execution.flight_id import Slot, slots
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.npcs.director_progress import DirectorProgress
+from pytest_garl.execution.result import FlightResult
+from pytest_garl.npcs.director_progress import DirectorProgress, EventProgress, Progress
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.plugin.options import population
 from pytest_garl.scenarios.files import parse_scenario
@@ -156,12 +157,16 @@ class Counts(Lessons):
         self.director = ""
         self.learned: list[tuple[int, int]] = []
 
-    def learn(self, generation: int, scenarios: Sequence[str]) -> DirectorProgress:
-        self.learned.append((generation, len(scenarios)))
+    def learn(self, generation: int, flown: Sequence[tuple[str, FlightResult | None]]) -> Progress:
+        self.learned.append((generation, len(flown)))
         self.director = f"time-to-go {generation} 0"
-        return DirectorProgress(
+        npcs = DirectorProgress(
             npcs=generation, learned=0, shipped=0, rule=0, best=0, seen=0, expected=0, met=0
         )
+        events = EventProgress(
+            flights=generation, learned=0, rule=0, best=0, struck=0, expected=0, violated=0
+        )
+        return Progress(npcs=npcs, events=events)
 
 
 def test_the_director_of_a_generation_has_learned_what_its_scenarios_were_bred_from(
@@ -191,7 +196,7 @@ def test_the_director_of_a_generation_has_learned_what_its_scenarios_were_bred_f
     assert lessons.learned == [(0, 4), (1, 4)]
     progress = ledger.facts.progress("s", 1)
     assert progress is not None
-    assert progress.npcs == 1
+    assert progress.npcs.npcs == progress.events.flights == 1
     assert ledger.facts.progress("s", 3) is None
     assert "time-to-go" not in (ledger.job("s") or ""), "the gate flies what ships"
     ledger.close()

@@ -8,12 +8,16 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.execution.flight_id import FlightId, Slot
+from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import save
+from pytest_garl.npcs.director_progress import AND_EVENTS, Progress
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.files import dump_scenario
+from pytest_garl.scenarios.groups import EVENT_MOMENTS
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.teaching import Lessons, Teacher
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 from tests.execution.flying import Good, job_of
 from tests.npcs.test_lessons import Sinks, chasing, flown
 
@@ -22,7 +26,8 @@ pytestmark = pytest.mark.sim
 
 @pytest.fixture(scope="module")
 def waiting() -> tuple[Scenario, Flight]:
-    scenario = chasing()
+    decided = float(EVENT_MOMENTS.index("decided"))
+    scenario = chasing().replace({"jump.after": decided, "jump.distance_m": 2.0})
     return scenario, flown(scenario)
 
 
@@ -34,18 +39,21 @@ def test_a_process_that_was_begun_anew_learns_the_same(
     for generation in range(2):
         slot = Slot(generation=generation, index=1)
         save(flight, job.record(FlightId(search="s", map=job.map, slot=slot)))
-    texts = [dump_scenario(scenario)] * 2
-    learned = []
+    landed = judged(flight, DEFAULT_LIMITS)
+    done = [(dump_scenario(scenario), landed)] * 2
+    learned: list[tuple[str, Progress, Progress]] = []
     with Teacher() as teacher:
         for interrupts in (False, True):
             lessons = Lessons(teacher, "s", job, Sinks.airframe)
             assert lessons.director == ""
-            first = lessons.learn(0, texts)
-            assert first.npcs == 1, "the other slot has no record"
+            first = lessons.learn(0, done)
+            assert first.npcs.npcs == first.events.flights == 1, "the other slot has no record"
             if interrupts:
                 teacher.close()
-            second = lessons.learn(1, texts)
+            second = lessons.learn(1, done)
             learned.append((lessons.director, first, second))
             teacher.close()
     assert learned[0] == learned[1]
-    assert learned[0][0]
+    director, _, second = learned[0]
+    assert all(director.split(AND_EVENTS))
+    assert second.events.struck == 1

@@ -17,6 +17,7 @@ import atexit
 import fcntl
 import gc
 import importlib
+import inspect
 import json
 import os
 import runpy
@@ -303,8 +304,11 @@ def import_all() -> None:
         for name in [*late, *IMPORTED_LATE]:
             importlib.import_module(name)
         config._ensure_unconfigure()
-    # A run with saved cases asks for this hash of the package, which takes longer than its flights.
+    # A run asks for these hashes of the package, which take longer than its flights.
     importlib.import_module("pytest_garl.execution.sources").flight_code_sha256()
+    importlib.import_module("pytest_garl.execution.reference").package_sha256()
+    # The first failure of a run asks for the file of each module that is loaded.
+    inspect.getmodule(import_all.__code__)
     gc.collect()
     # A run need not look at what was made here whenever it collects.
     gc.freeze()

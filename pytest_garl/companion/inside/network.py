@@ -24,6 +24,8 @@ VEHICLE_PORTS = (*range(5760, 5780), *range(14500, 14700))
 """Where the vehicle listens, and where a program that listens hears it: MAVLink's usual ports."""
 VEHICLE = ("127.0.0.1", 14555)
 LARGEST = 65_507
+MOST_SENT = 200_000
+"""Bytes to the vehicle in one exchange: no serial port carries a tenth of it."""
 _modules_own: Any = socket
 """Before Python 3.10 its ``timeout`` was no ``TimeoutError``."""
 Address = tuple[str, int]
@@ -37,7 +39,7 @@ class Network:
 
     def __init__(self, turns: Turns) -> None:
         self.turns = turns
-        self.outbox: list[bytes] = []
+        self.outbox = bytearray()
         self.sockets: dict[int, Socket] = {}
         self.bound: dict[tuple[int, Any], Socket] = {}
         self.to_vehicle: list[Socket] = []
@@ -55,6 +57,10 @@ class Network:
         if data:
             for each in list(self.to_vehicle):
                 each.take(data, VEHICLE)
+
+    def transmit(self, data: bytes) -> None:
+        """Send bytes to the vehicle; of a flood the first part."""
+        self.outbox += data[: MOST_SENT - len(self.outbox)]
 
     def link(self, end: Socket) -> None:
         """Note that a socket is an end of a link to the vehicle."""
@@ -218,7 +224,7 @@ class Socket(_RealSocket):
             if self._other is None:
                 return self.sendto(sent, self._peer)
         if self._is_vehicles:
-            self.network.outbox.append(sent)
+            self.network.transmit(sent)
         elif self._other is not None and not self._other._closed:  # type: ignore[attr-defined]
             self._other.take(sent, self._own)
         else:
@@ -241,7 +247,7 @@ class Socket(_RealSocket):
             other.take(sent, self._own)
         elif address[:2] == VEHICLE or port in VEHICLE_PORTS:
             self.network.link(self)
-            self.network.outbox.append(sent)
+            self.network.transmit(sent)
         return len(sent)
 
     def sendmsg(self, buffers: Any, *_: Any) -> int:

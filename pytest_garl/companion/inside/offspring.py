@@ -109,8 +109,7 @@ def install(host: Any, header: struct.Struct) -> None:
                     break
             (size,) = struct.unpack_from("!I", answer)
             facts = json.loads(answer[4 : 4 + size])
-            if answer[4 + size :]:
-                network.outbox.append(answer[4 + size :])
+            network.transmit(answer[4 + size :])
             sight.found += [(number, corners) for number, corners in facts["found"]]
             host.links_opened = max(host.links_opened, facts["links"])
             if self._out is None:

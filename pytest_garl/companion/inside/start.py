@@ -26,8 +26,6 @@ MOST_PRINTED = 2_000
 """Characters of what a program prints between two exchanges that are kept."""
 MOST_FOUND = 50
 """Markers of one exchange that are told."""
-MOST_SENT = 200_000
-"""Bytes to the vehicle in one exchange: no serial port carries a tenth of it."""
 
 
 def load_inside() -> Any:
@@ -119,13 +117,13 @@ class Host:
 
     def tell(self, more: dict[str, Any]) -> None:
         """Write what the program did since the exchange before."""
-        sent, self.network.outbox = b"".join(self.network.outbox), []
+        sent, self.network.outbox = bytes(self.network.outbox), bytearray()
         found, self.sight.found = self.sight.found[:MOST_FOUND], []
         printed, self.printed.texts = "".join(self.printed.texts), []
         self.links_opened = max(self.links_opened, len(self.network.to_vehicle))
         facts = {"printed": printed, "found": found, "links": self.links_opened, **more}
         text = json.dumps(facts).encode()
-        self._write(b"D", struct.pack("!I", len(text)) + text + sent[:MOST_SENT])
+        self._write(b"D", struct.pack("!I", len(text)) + text + sent)
 
     def wait_for_the_end(self) -> None:
         """Read until the simulator closes the link: what was told last may not be read yet."""
@@ -201,7 +199,7 @@ def install(host: Host) -> None:
     sys.modules[f"{NAME}.offspring"].install(host, HEADER)
     tags = {
         name: lambda module: sight.change_apriltag(module, host.sight)
-        for name in ("pupil_apriltags", "dt_apriltags", "pyapriltags")
+        for name in ("apriltag", "dt_apriltags", "pupil_apriltags", "pyapriltags")
     }
 
     mavsdk = sys.modules[f"{NAME}.mavsdk_system"].change_mavsdk
@@ -300,10 +298,12 @@ def main() -> None:
     """Run the program, and tell how it ended."""
     faulthandler.enable(2)
     faulthandler.register(ASKED, 2)
+    signal.siginterrupt(ASKED, False)
     settings = json.loads(sys.argv[1])
     link = socket.socket(fileno=settings["link"])
     link.sendall(HEADER.pack(b"R", 0))
     _end_with_parent()
+    _limit_memory()
     sys.path[:] = [each for each in sys.path if Path(each or ".").resolve() != HERE]
     load_inside()
     host = Host(link, settings)
@@ -340,12 +340,26 @@ def _finish() -> None:
     atexit._run_exitfuncs()
 
 
+def _limit_memory() -> None:
+    """Let a program without end to its memory fail, before the machine has none left."""
+    import resource
+
+    half = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
+    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    if soft == resource.RLIM_INFINITY:
+        resource.setrlimit(resource.RLIMIT_DATA, (half, hard))
+
+
 def _end_with_parent() -> None:
-    """Let the system end this process with the simulator's, where it can (Linux)."""
+    """Let the system end this process with the simulator's, where it can (Linux).
+
+    It adopts its orphans, so that the simulator finds them below it and ends them.
+    """
     import ctypes
 
     try:
         ctypes.CDLL(None).prctl(1, 9)
+        ctypes.CDLL(None).prctl(36, 1)
     except AttributeError:
         return
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pytest_garl.errors import PolicyError
+from pytest_garl.npcs.directed import Directed
 from pytest_garl.scenarios.story import GRADES, story_of
 from pytest_garl.simulation.npc_policy import Move, NpcPolicy, Situation
 
@@ -14,6 +15,7 @@ class Graded:
 
     grade = ""
     decides_begin = True
+    event_director = staticmethod(Directed.event_director)
 
     def __init__(self, director: str = "") -> None:
         self._director = director

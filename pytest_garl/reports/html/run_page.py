@@ -20,12 +20,14 @@ from pytest_garl.reports.run_text import (
     counted_causes,
     counts_text,
     director_text,
+    event_director_text,
     in_control_text,
     kinds_lines,
     limits_text,
     movers_text,
     origins_text,
     percent,
+    strikes_text,
 )
 
 MOST_THUMBNAILS = 24
@@ -171,6 +173,8 @@ def figures(search: SearchRecord) -> list[Fact]:
         found.append(("who moved the NPCs", movers_text(search)))
     if search.director is not None:
         found.append(("what begins of NPCs were worth", director_text(search)))
+    found.append(("who let events strike", strikes_text(search)))
+    found.append(("what strikes of events were worth", event_director_text(search)))
     return [figure for figure in found if figure[1]]
 
 

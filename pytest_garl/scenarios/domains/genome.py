@@ -19,7 +19,14 @@ from pytest_garl.scenarios.genes import (
     within,
 )
 from pytest_garl.scenarios.genome_like import story_property
-from pytest_garl.scenarios.groups import GROUPS, QUANTITIES, WEATHER, WEATHER_CAUSES
+from pytest_garl.scenarios.groups import (
+    DECIDED,
+    EVENT_MOMENTS,
+    GROUPS,
+    QUANTITIES,
+    WEATHER,
+    WEATHER_CAUSES,
+)
 from pytest_garl.scenarios.light import position_of_elevation
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
@@ -59,7 +66,7 @@ def genome_of(
             if limits and limits[0] == limits[1]:
                 fixed[key] = limits[0]
             elif limits:
-                values.append(within(QUANTITIES[key], *limits))
+                values.append(within(QUANTITIES[key], *_drawn(domain, key, limits)))
         if values:
             composites.append(CompositeGene(name=name, genes=(_optional(name, values),)))
     return Genome(
@@ -71,6 +78,22 @@ def genome_of(
         if domain.npc_behaviour == ABSENT
         else (),
     )
+
+
+def _drawn(domain: Domain, key: str, limits: tuple[float, float]) -> tuple[float, float]:
+    """Return the limits of draws of a condition.
+
+    Where NPCs may interfere, half of the events that may wait for the director's decision do, as
+    more than half of the stories of such NPCs.  Elsewhere nobody decides, and none does.
+    """
+    low, high = limits
+    decision = EVENT_MOMENTS.index(DECIDED)
+    if not key.endswith(".after") or high < decision:
+        return limits
+    if domain.npc_behaviour not in GRADES[1:]:
+        return low, decision - 1.0
+    # A moment is drawn as a rounded number: the others reach from low to half below the decision.
+    return low, 2 * (decision - 0.5) - low
 
 
 def _optional(name: str, values: Iterable[Quantity], *, may_rest: bool = True) -> NuclearGene:

@@ -142,7 +142,7 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
         ('"test_it.py"', '"test_no.py"', "key 'systems.Good': found 'test_no.py', expected tests"),
         ('"court"]', '"moon"]', "key 'maps': unknown map 'moon'; expected one of court, "),
         ('"random"]', '"luck"]', "key 'methods': search method 'luck': cannot be loaded"),
-        ('"random"]', '"nowhere:Luck"]', "pytest ended with status 4; its output is in"),
+        ('"garl", "random"', '"nowhere:Luck"', "pytest ended with status 4; its output is in"),
         ("budget = 12", "budget = 1.5", "toy.toml: key 'budget': found 1.5, expected a whole"),
     ],
 )
@@ -242,6 +242,7 @@ def test_an_interrupted_or_killed_run_continues(slow_project: Path) -> None:
     assert without_times(read_rows(slow_project / "toy.csv")) == without_times(expected)
 
 
+@pytest.mark.long
 def test_a_run_of_changed_code_is_refused(slow_project: Path) -> None:
     process = start()
     wait_for_flights(slow_project, 1, process)

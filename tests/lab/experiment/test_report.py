@@ -82,9 +82,13 @@ def experiment(tmp_path: Path) -> Experiment:
     return read_experiment(tmp_path / "mine.toml")
 
 
-def report(experiment: Experiment, rows: tuple[ResultRow, ...]) -> str:
+def report(experiment: Experiment, rows: tuple[ResultRow, ...], *, draws: bool = False) -> str:
+    """Write a report; a picture takes most of a second, so only the tests of pictures draw one."""
     path = experiment.file.parent / "out" / "mine.md"
-    assert write_report(experiment, rows, "mine.csv", path) == path
+    with pytest.MonkeyPatch.context() as patch:
+        if not draws:
+            patch.setattr("lab.experiment.report.draw_grid", lambda *given: True)
+        assert write_report(experiment, rows, "mine.csv", path) == path
     return path.read_text()
 
 
@@ -181,11 +185,11 @@ def test_a_new_report_keeps_remarks(experiment: Experiment) -> None:
 
 
 def test_equal_rows_make_equal_bytes(experiment: Experiment) -> None:
-    first = report(experiment, GARL + RANDOM)
+    first = report(experiment, GARL + RANDOM, draws=True)
     picture = experiment.file.parent / "out" / "pictures" / "mine-rq2.png"
     before = picture.read_bytes()
     picture.unlink()
-    assert report(experiment, tuple(reversed(GARL + RANDOM))) == first
+    assert report(experiment, tuple(reversed(GARL + RANDOM)), draws=True) == first
     assert picture.read_bytes() == before
     assert before.startswith(b"\x89PNG")
     assert len(before) < 60_000
@@ -193,7 +197,7 @@ def test_equal_rows_make_equal_bytes(experiment: Experiment) -> None:
 
 
 def test_a_report_without_rows_says_not_run(experiment: Experiment) -> None:
-    text = report(experiment, ())
+    text = report(experiment, (), draws=True)
     assert "RQ2: 0 of 6 searches" in text
     assert text.count("**not run**") == len(goals.GOALS)
     assert "Flown with" not in text

@@ -167,6 +167,7 @@ def test_shifting_keeps_labels_on_their_markers() -> None:
             assert image[y - 15, x - 15, 0] == 240
 
 
+@pytest.mark.long
 def test_a_few_steps_of_training_lower_the_loss_and_go_on_where_they_stopped(
     tmp_path: Path,
 ) -> None:

@@ -26,6 +26,7 @@ def test_the_curves_of_all_seeds_are_one_picture(tmp_path: Path, episodes: int) 
 
 
 @pytest.mark.sim
+@pytest.mark.long
 def test_validation_is_the_same_for_any_number_of_processes() -> None:
     network = Learner(10, 5, Training()).policy("relative")
     blind = dataclasses.replace(OURS, uav="straight")

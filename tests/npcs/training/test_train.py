@@ -16,6 +16,7 @@ class _StopError(Exception):
 
 
 @pytest.mark.sim
+@pytest.mark.long
 def test_a_killed_training_continues_to_the_same_weights(tmp_path: Path) -> None:
     training = Training(episodes=4, warm_up=64)
     whole = train(OURS, training)
