@@ -179,6 +179,21 @@ def program_named(module: str, name: str) -> ProgramSystem | None:
     return _made.get((module, name))
 
 
+def identifier_of(text: str) -> str:
+    """Return a name of letters, digits and _ for what a command runs."""
+    name = "".join(char if char.isalnum() else "_" for char in text)
+    return name if name[:1].isalpha() or name[:1] == "_" else f"_{name}"
+
+
+def end_in_words(status: int) -> tuple[str, str]:
+    """Return how a process ended, as a signature and as a sentence have it."""
+    if status >= 0:
+        return f"exit-status-{status}", f"exit status {status}"
+    known = -status in {*signal.Signals}
+    name = f" ({signal.Signals(-status).name})" if known else ""
+    return f"signal-{-status}", f"signal {-status}{name}"
+
+
 def started_by(pid: int) -> list[int]:
     """Return the ids of all processes below one, in any session, where the system tells (Linux)."""
     found = [pid]

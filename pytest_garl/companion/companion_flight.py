@@ -35,7 +35,7 @@ from pytest_garl.landing_system import (
     Observation,
     VehicleState,
 )
-from pytest_garl.program import ProgramFailedError, kill, started_by
+from pytest_garl.program import ProgramFailedError, end_in_words, kill, started_by
 from pytest_garl.vehicle.autopilot import ArduCopter
 from pytest_garl.vehicle.mavlink import MavlinkLink
 from pytest_garl.vehicle.ned import on_globe
@@ -405,15 +405,12 @@ class CompanionProcess:
         for _ in range(2):
             with contextlib.suppress(OSError, KeyError):
                 self._read_output()
-        how = f"exit status {status}" if status >= 0 else f"signal {-status}"
-        name = f" ({signal.Signals(-status).name})" if -status in {*signal.Signals} else ""
+        error, how = end_in_words(status)
         said = self._said.decode(errors="replace").strip()
         end = f"; it said last: {said[-300:]}" if said else ""
         if place := self._place():
             end = f", at {place}"
-        return self._failure(
-            how.replace(" ", "-"), f"ended in the flight with {how}{name}{end}", trace=said
-        )
+        return self._failure(error, f"ended in the flight with {how}{end}", trace=said)
 
     def _failure(self, error: str, message: str, *, trace: str = "") -> ProgramFailedError:
         return ProgramFailedError(

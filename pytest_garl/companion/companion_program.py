@@ -17,7 +17,7 @@ from pytest_garl.airframe import MAX_RATE_HZ, Airframe, Camera, airframe_of
 from pytest_garl.companion.companion_flight import CompanionFlight, Start, mission_facts
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.messages import listed, shown
-from pytest_garl.program import ProgramSystem
+from pytest_garl.program import ProgramSystem, identifier_of
 from pytest_garl.vehicle.autopilot import ArduCopter
 from pytest_garl.vehicle.mavlink import dialect
 from pytest_garl.vehicle.px4 import Px4Copter
@@ -191,6 +191,4 @@ def _parsed(command: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _name_of(arguments: Sequence[str]) -> str:
-    named = arguments[1] if arguments[0] == "-m" else Path(arguments[0]).stem
-    name = "".join(char if char.isalnum() else "_" for char in named)
-    return name if name[:1].isalpha() or name[:1] == "_" else f"_{name}"
+    return identifier_of(arguments[1] if arguments[0] == "-m" else Path(arguments[0]).stem)

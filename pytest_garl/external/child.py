@@ -18,7 +18,7 @@ from typing import IO, Literal
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.messages import shortened
-from pytest_garl.program import ProgramFailedError, kill, started_by
+from pytest_garl.program import ProgramFailedError, end_in_words, kill, started_by
 
 LONGEST_LINE = 2**20
 """Bytes of an answer: 1,000 points of a path and 100 detections take a tenth."""
@@ -153,13 +153,10 @@ class Child:
         if not ended:
             message = f"closed its stdin or stdout before it answered {what}, and runs on"
             return self.failure("died", "Closed", message)
-        status = self._status()
-        how = f"signal {-status}" if status < 0 else f"exit status {status}"
-        name = f" ({signal.Signals(-status).name})" if -status in {*signal.Signals} else ""
+        error, how = end_in_words(self._status())
         reasons = REASON.findall(self.said)
         reason = f": {shortened(reasons[-1].strip(), 300)}" if reasons else ""
-        message = f"ended with {how}{name} before it answered {what}{reason}"
-        return self.failure("died", how.replace(" ", "-"), message)
+        return self.failure("died", error, f"ended with {how} before it answered {what}{reason}")
 
     def _status(self) -> int:
         """Return the status of a process that has ended, and leave it to be waited for."""

@@ -16,7 +16,7 @@ from pytest_garl.external.child import Child
 from pytest_garl.external.frame_memory import FrameMemory
 from pytest_garl.landing_system import Command, Mission, Observation
 from pytest_garl.messages import printable, shown
-from pytest_garl.program import ProgramSystem
+from pytest_garl.program import ProgramSystem, identifier_of
 
 T = TypeVar("T")
 INTERPRETER = re.compile(r"(python|ruby|perl|node|java|lua|env|sh|bash|nice|ros2|stdbuf)[\d.]*")
@@ -159,6 +159,4 @@ def _name_of(command: Sequence[str]) -> str:
     words = [word for word in command if not word.startswith("-")]
     own = [word for word in words if not INTERPRETER.fullmatch(Path(word).name)] or words
     files = [word for word in own if "/" in word or Path(word).suffix]
-    stem = Path((files or own or command)[0]).stem
-    name = "".join(char if char.isalnum() else "_" for char in stem)
-    return name if name[:1].isalpha() or name[:1] == "_" else f"_{name}"
+    return identifier_of(Path((files or own or command)[0]).stem)
