@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -185,6 +186,32 @@ def test_settings_of_the_page_are_all_there_are(project: Path) -> None:
         [sys.executable, "-m", "pytest", "--help"], capture_output=True, text=True, check=True
     ).stdout
     assert sorted(named) == sorted(re.findall(r"^  (garl_[\w-]+) \(", shown, re.M))
+
+
+def runs_of_the_page() -> list[str]:
+    """Return the commands of the table of runs: at the desk, for a pull request, in the night."""
+    rows = (ROOT / "docs" / "ci.md").read_text().partition("| where | command |")[2]
+    return re.findall(r"^\| (?:at the desk|pull request|night) \| `([^`]+)`", rows, re.M)
+
+
+@pytest.mark.parametrize(("run", "slots"), [*zip(runs_of_the_page(), (16, 0, 800), strict=True)])
+def test_runs_of_the_page_collect_what_they_say_with_its_settings(
+    run: str, slots: int, project: Path
+) -> None:
+    (project / "pytest.ini").unlink()
+    (project / "pyproject.toml").write_text(settings_of_the_page())
+    given = {key: value for key, value in os.environ.items() if key != "PYTEST_ADDOPTS"}
+    path = os.pathsep.join([str(SUPPORT), str(project)])
+    done = subprocess.run(
+        [sys.executable, "-m", *shlex.split(run), "--collect-only", "-q"],
+        cwd=project,
+        env={**given, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert len(set(re.findall(r"\[((?:lawn|court)-g\d+-s\d+)\]", done.stdout))) == slots
 
 
 def test_settings_of_the_page_are_the_defaults(
