@@ -10,12 +10,12 @@ import argparse
 import itertools
 import json
 import os
-from collections.abc import Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lab.ablations import LANDINGS, MAPS, interval
 from lab.stand_in import stand_in
@@ -29,16 +29,16 @@ from pytest_garl.search.archive import Archive, ArchivedFlight, ArchivedSearch
 from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.search.methods.garl import Garl
 
-LENGTHS = {"5 x 100": (5, 100, 10), "2 x 400": (2, 400, 20)}
-"""Nights, flights of a night, and the population that these have by default."""
+NIGHTS, BUDGET, POPULATION = 5, 100, 10
 VARIANTS = ("alone", "archive")
-SEEDS = tuple(str(seed) for seed in range(220, 226))
+SEEDS = tuple(str(seed) for seed in range(220, 224))
+Counts = NDArray[np.int64]
 NIGHT = 1000
 """The seeds of the nights of a study lie so far apart."""
 TABLE = ResultTable(
     file=Path("docs/nights.csv"),
-    columns=("variant", "length", "landing", "seed", "map", "kinds", "violations"),
-    key=("variant", "length", "landing", "seed", "map"),
+    columns=("variant", "landing", "seed", "map", "kinds", "violations"),
+    key=("variant", "landing", "seed", "map"),
 )
 
 
@@ -52,21 +52,20 @@ def fly_nights(key: Key) -> dict[str, Any]:
 
     ``kinds`` are those that are known after each night.
     """
-    variant, length, landing, seed, map_name = key
-    nights, budget, population = LENGTHS[length]
+    variant, landing, seed, map_name = key
     map = load_map(map_name)
     genome = genome_of(domain_named("field"), map)
     archive, seen, known, violations = Archive(), set[str](), list[int](), 0
-    for night in range(nights):
+    for night in range(NIGHTS):
         own = archive.knowledge("", "", genome, map)
         plan = SearchPlan(
             map=map,
             genome=genome,
             seed=int(seed) + NIGHT * night,
-            population=population,
+            population=POPULATION,
             known=own.known if variant == "archive" else (),
         )
-        flown = _fly(plan, landing, budget)
+        flown = _fly(plan, landing)
         shown = [result.signature for _, result in flown if result.signature]
         seen.update(shown)
         known.append(len(seen))
@@ -76,7 +75,6 @@ def fly_nights(key: Key) -> dict[str, Any]:
         archive = Archive(searches=(latest.after(*archive.searches or [None]),))
     return {
         "variant": variant,
-        "length": length,
         "landing": landing,
         "seed": seed,
         "map": map_name,
@@ -85,10 +83,10 @@ def fly_nights(key: Key) -> dict[str, Any]:
     }
 
 
-def _fly(plan: SearchPlan, landing: str, budget: int) -> list[tuple[str, FlightResult]]:
+def _fly(plan: SearchPlan, landing: str) -> list[tuple[str, FlightResult]]:
     """Fly the search of a night; return scenario and result of each flight."""
     method, flown = Garl(plan), list[tuple[str, FlightResult]]()
-    for _ in range(budget // plan.population):
+    for _ in range(BUDGET // plan.population):
         scenarios = method.ask()
         results = [stand_in(each, plan.map, LANDINGS[landing]) for each in scenarios]
         pairs = [*zip(scenarios, results, strict=True)]
@@ -100,15 +98,15 @@ def _fly(plan: SearchPlan, landing: str, budget: int) -> list[tuple[str, FlightR
 def report(rows: list[Row]) -> str:
     """Return the table in Markdown: new kinds of later nights, and their paired difference."""
     lines = [
-        "| nights | landing | pairs | kinds of the first night | new kinds of the later nights, "
-        "alone | with the archive | difference |",
-        "| --- | --- | ---: | ---: | ---: | ---: | ---: |",
+        "| landing | pairs | kinds of the first night | nights | new kinds, alone | "
+        "with the archive | difference |",
+        "| --- | ---: | ---: | --- | ---: | ---: | ---: |",
     ]
-    for length, landing in itertools.product(LENGTHS, LANDINGS):
+    for landing in LANDINGS:
         of = {
-            (row["variant"], row["seed"], row["map"]): json.loads(row["kinds"])
+            (row["variant"], row["seed"], row["map"]): np.array(json.loads(row["kinds"]))
             for row in rows
-            if (row["length"], row["landing"]) == (length, landing)
+            if row["landing"] == landing
         }
         pairs = [
             (kinds, of["archive", seed, map])
@@ -116,35 +114,31 @@ def report(rows: list[Row]) -> str:
             if variant == "alone" and ("archive", seed, map) in of
         ]
         if pairs:
-            lines.append(f"| {length} | {landing} | {_cells(pairs)} |")
+            alone, kept = (np.array(own) for own in zip(*pairs, strict=True))
+            first = f"{landing} | {len(pairs)} | {alone[:, 0].mean():.1f}"
+            for nights, last in (("second", 1), ("second to fifth", NIGHTS - 1)):
+                new = [own[:, last] - own[:, 0] for own in (alone, kept)]
+                lines.append(f"| {first} | {nights} | {_cells(*new)} |")
     return "\n".join(lines)
 
 
-def _cells(pairs: Sequence[tuple[list[int], list[int]]]) -> str:
-    alone, kept = (
-        np.array([kinds[-1] - kinds[0] for kinds in own]) for own in zip(*pairs, strict=True)
-    )
-    first = np.mean([kinds[0] for kinds, _ in pairs])
-    return (
-        f"{len(pairs)} | {first:.1f} | {alone.mean():.1f} | {kept.mean():.1f} | "
-        f"{interval(list(kept - alone))}"
-    )
+def _cells(alone: Counts, kept: Counts) -> str:
+    return f"{alone.mean():.1f} | {kept.mean():.1f} | {interval(list(kept - alone))}"
 
 
 def main() -> None:
     """Fly the missing studies, or print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", nargs="+", default=list(SEEDS))
-    parser.add_argument("--lengths", nargs="+", default=list(LENGTHS))
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     run_study(parser, TABLE, report, fly_studies)
 
 
 def fly_studies(arguments: argparse.Namespace) -> None:
     """Fly the studies that the table lacks."""
-    keys = itertools.product(arguments.lengths, arguments.seeds, MAPS, LANDINGS, VARIANTS)
+    keys = itertools.product(arguments.seeds, MAPS, LANDINGS, VARIANTS)
     TABLE.fly_missing(
-        ((variant, length, landing, seed, map) for length, seed, map, landing, variant in keys),
+        ((variant, landing, seed, map) for seed, map, landing, variant in keys),
         search,
         arguments.workers,
     )

@@ -25,6 +25,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import simulator_sha256
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.files.atomic import write_bytes_atomically
+from pytest_garl.files.bounded_files import read_bytes
 from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.files import parse_scenario
@@ -41,6 +42,10 @@ LEAST_OF_A_KIND = 5
 MOST_SUSPECTS = 20
 """A search flies at most so many scenarios again that failed elsewhere."""
 SHOWN_DIGITS = 12
+LARGEST_FILE, LARGEST_TEXT = 64_000_000, 512_000_000
+"""Most bytes of the file, and of its text: a flight has some 3 kB of it."""
+_GZIP = 31
+"""Of ``zlib``: a stream with the header of gzip."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,11 +114,11 @@ class Archive:
         own = [each for each in on_map if each.search == search]
         for each in own:
             if each.flown_by == flown_by:
-                known = tuple(
+                known = [
                     FlownScenario(scenario=parse_scenario(flight.scenario), result=flight.result)
                     for flight in each.flights
-                )
-                return Knowledge(known=known)
+                ]
+                return Knowledge(known=tuple(e for e in known if _is_within(e.scenario, genome)))
         others = [*own, *(each for each in on_map if each.search != search)]
         return Knowledge(suspects=tuple(_suspects(others, genome, map))[:MOST_SUSPECTS])
 
@@ -154,8 +159,16 @@ def flown_by(job: str) -> str:
 def read_archive(path: Path) -> Archive:
     """Read an archive; raise ArchiveError for a file that is damaged or of another version."""
     remedy = "Remove it: the next search writes a new one"
+    packed = read_bytes(path, LARGEST_FILE, ArchiveError, f". {remedy}")
+    unpacking = zlib.decompressobj(wbits=_GZIP)
     try:
-        values: Any = parse_json(gzip.decompress(path.read_bytes()))
+        content = unpacking.decompress(packed, LARGEST_TEXT)
+        if not unpacking.eof:
+            raise ArchiveError(
+                f"{path}: this archive ends too early, or holds more than {LARGEST_TEXT} bytes of "
+                f"text. {remedy}"
+            )
+        values: Any = parse_json(content)
         if not isinstance(values, dict) or values.pop("format", None) != FORMAT:
             raise ArchiveError(f"{path}: this is no archive of pytest-garl. {remedy}")
         if (version := values.pop("version", None)) != VERSION:
@@ -167,9 +180,7 @@ def read_archive(path: Path) -> Archive:
         for search in found.searches:
             for flight in search.flights:
                 parse_scenario(flight.scenario)
-    except OSError as error:
-        raise ArchiveError(f"{path}: cannot be read as an archive ({error}). {remedy}") from error
-    except (ValueError, EOFError, zlib.error, ScenarioError) as error:
+    except (ValueError, zlib.error, ScenarioError) as error:
         raise ArchiveError(f"{path}: this archive is damaged: {error}. {remedy}") from error
     return found
 
@@ -197,11 +208,16 @@ def _suspects(searches: Sequence[ArchivedSearch], genome: Genome, map: Map) -> I
             kind = flight.result.signature
             if kind and kind not in seen:
                 scenario = parse_scenario(flight.scenario)
-                try:
-                    row = encode(dataclasses.replace(scenario, task=genome.task), genome)
-                except ScenarioError:
-                    # Another domain may reach farther.
-                    continue
-                seen.add(kind)
-                made = decode(row, genome, map=map.name, seed=scenario.seed)
-                yield repair(made, map)
+                # Another domain may reach farther.
+                if _is_within(scenario, genome):
+                    seen.add(kind)
+                    row = encode(scenario, genome)
+                    yield repair(decode(row, genome, map=map.name, seed=scenario.seed), map)
+
+
+def _is_within(scenario: Scenario, genome: Genome) -> bool:
+    try:
+        encode(scenario, genome)
+    except ScenarioError:
+        return False
+    return True

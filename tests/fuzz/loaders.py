@@ -1,7 +1,8 @@
-"""The ten kinds of files: good samples of each, and what the project does with one."""
+"""The eleven kinds of files: good samples of each, and what the project does with one."""
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import io
 import json
@@ -32,10 +33,13 @@ from pytest_garl.npcs import learned as network
 from pytest_garl.npcs.weights import WEIGHTS
 from pytest_garl.scenarios import files as scenarios
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.scenarios.files import dump_scenario, parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import loading as maps
 from pytest_garl.scenarios.validity import problems
+from pytest_garl.search import archive as archives
+from pytest_garl.search.method import FlownScenario, SearchPlan
+from pytest_garl.search.methods.garl import Garl
 from pytest_garl.search.objectives import violation_proximity
 from tests.cases import samples as case_samples
 from tests.execution.flying import Good, job_of, scenario
@@ -43,6 +47,7 @@ from tests.fuzz import binary_mutations, mutations
 from tests.gate import samples as baseline_samples
 from tests.lab.experiment.samples import row
 from tests.lab.experiment.test_spec import TEXT as PLAN
+from tests.support.results import flight_result
 
 Change = Callable[[random.Random], None]
 _COURT = maps.load_map("court")
@@ -252,6 +257,39 @@ def _load_rows(path: Path, rng: random.Random) -> None:
     assert len({each.key for each in found}) <= len(found)
 
 
+def _prepare_archive(folder: Path, rng: random.Random) -> Path:
+    path, genome = folder / "night.archive", genome_for(_COURT)
+    whole = decode(genome.nominal, genome, map="court", seed=1)
+    flight = archives.ArchivedFlight(scenario=dump_scenario(whole), result=flight_result("I:a"))
+    search = archives.ArchivedSearch(
+        search="a", system="m:C", map="court", flown_by="b", flights=(flight,)
+    )
+    content = archives.Archive(searches=(search,)).text
+    if rng.random() < 0.3:
+        path.write_bytes(mutations.bytes_changed(gzip.compress(content.encode()), rng))
+    else:
+        changed = mutations.text_changed(content, rng).encode(errors="surrogatepass")
+        path.write_bytes(gzip.compress(changed))
+    return path
+
+
+def _load_archive(path: Path, rng: random.Random) -> None:
+    found, genome = archives.read_archive(path), genome_for(_COURT)
+    for name in ("a", "c"):
+        own = found.knowledge(name, "b", genome, _COURT)
+        plan = SearchPlan(
+            map=_COURT,
+            genome=genome,
+            seed=0,
+            population=4,
+            known=own.known,
+            suspects=own.suspects,
+        )
+        method = Garl(plan)
+        method.tell([FlownScenario(scenario=e, result=flight_result()) for e in method.ask()])
+        method.ask()
+
+
 LOADERS = {
     "case": Loader(prepare=_text_file("cases/flying/one.toml", _cases), load=_load_case),
     "map": Loader(
@@ -276,5 +314,6 @@ LOADERS = {
     "manifest": Loader(prepare=_prepare_manifest, load=_load_weights),
     "record": Loader(prepare=_prepare_record, load=_load_record),
     "ledger": Loader(prepare=_prepare_ledger, load=_load_ledger),
+    "archive": Loader(prepare=_prepare_archive, load=_load_archive),
     "rows": Loader(prepare=_text_file("rows.csv", _rows), load=_load_rows),
 }

@@ -163,7 +163,7 @@ def test_an_archive_that_cannot_be_read_ends_the_session_before_a_flight(
     carrying(pytester).write_text("nothing")
     result = run(pytester, *SEARCH)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["ERROR: *night.archive: cannot be read as an archive*Remove it*"])
+    result.stderr.fnmatch_lines(["ERROR: *night.archive: this archive is damaged*Remove it*"])
     assert not (pytester.path / ".garl" / "flights").exists()
 
 

@@ -122,11 +122,11 @@ def test_flights_of_other_code_are_not_kept() -> None:
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (b"no gzip", "cannot be read as an archive"),
+        (b"no gzip", "this archive is damaged"),
         (gzip.compress(b"{"), "this archive is damaged: not valid JSON"),
         (gzip.compress(b"[1]"), "this is no archive of pytest-garl"),
         (gzip.compress(b'{"format": "pytest-garl-archive", "version": 7}'), "found version 7"),
-        (gzip.compress(b"{}")[:-9], "this archive is damaged"),
+        (gzip.compress(b"{}")[:-9], "this archive ends too early"),
         (
             gzip.compress(
                 b'{"format": "pytest-garl-archive", "version": 1, "searches": [{"map": 1}]}'
@@ -140,6 +140,21 @@ def test_a_file_that_is_no_archive_is_refused(tmp_path: Path, content: bytes, sa
     file.write_bytes(content)
     with pytest.raises(ArchiveError, match=f"^{file}: .*{says}.*Remove it: the next search"):
         read_archive(file)
+
+
+def test_what_would_fill_the_memory_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "it"
+    file.write_bytes(gzip.compress(b" " * 3000))
+    monkeypatch.setattr("pytest_garl.search.archive.LARGEST_TEXT", 2000)
+    with pytest.raises(ArchiveError, match="holds more than 2000 bytes of text"):
+        read_archive(file)
+    monkeypatch.setattr("pytest_garl.search.archive.LARGEST_FILE", 20)
+    with pytest.raises(ArchiveError, match=r"expected at most 20\. Remove it"):
+        read_archive(file)
+    with pytest.raises(ArchiveError, match="found a folder"):
+        read_archive(tmp_path)
 
 
 def test_a_scenario_that_cannot_be_read_is_named(tmp_path: Path) -> None:
