@@ -14,6 +14,7 @@ from typing import Any, get_args
 
 from pytest_garl.cases.case import Escape, NoGateReason, Preventable, Status
 from pytest_garl.cases.case_header import SCHEMA as CASE_SCHEMA
+from pytest_garl.engine import Engine
 from pytest_garl.execution.reference import SYSTEM_NAME
 from pytest_garl.fiducial import DICTIONARIES, FARTHEST_M, MOST_NESTED, SIDE_M
 from pytest_garl.scenarios.domains.domain import ABSENT, CONDITIONS
@@ -286,7 +287,8 @@ def _evidence() -> Schema:
         "removed": _text("what shrinking removed"),
         "versions": {"type": "object", "additionalProperties": {"type": "string"}},
     }
-    return _table(own, required=tuple(own))
+    engine = _one_of(get_args(Engine), "that flew the reference; without it Bullet")
+    return _table({**own, "engine": engine}, required=tuple(own))
 
 
 def _marker() -> Schema:
