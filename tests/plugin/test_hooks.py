@@ -15,7 +15,7 @@ from tests.support.landing_project import (
 )
 
 
-@pytest.mark.parametrize("parallel", [(), ("-n2",)])
+@pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
 def test_each_violation_fails_one_item_and_xfails_its_duplicates(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:

@@ -21,7 +21,7 @@ def files(pytester: pytest.Pytester, folder: str) -> dict[str, bytes]:
     }
 
 
-@pytest.mark.parametrize("workers", [(), ("-n2",)])
+@pytest.mark.parametrize("workers", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
 def test_a_search_writes_its_pages(pytester: pytest.Pytester, workers: tuple[str, ...]) -> None:
     project(pytester)
     result = run(pytester, *SEARCH, "--garl-report=pages", *workers)
