@@ -194,18 +194,18 @@ def test_resume_refuses_another_search_and_a_changed_system(pytester: pytest.Pyt
     search = ("--garl-budget=2", "--garl-workers=0")
     run(pytester, *search)
     before = result_hash(pytester)
-    for option, words in {
-        "--garl-seed=1": "*seed was 0, is 1*",
-        "--garl-method=random": "*method was garl, is random*",
-        "--garl-domain=calm": "*domain was paper, is calm*",
-        "--garl-workers=0": "*Slow on lawn is not what it was: systems.py changed*",
-    }.items():
-        if "systems.py" in words:
-            pytester.makepyfile(systems=SLOW.replace("0.03", "0.04"))
-        result = run(pytester, *search, "--garl-resume", option)
+
+    def is_refused(words: str, *options: str) -> None:
+        result = run(pytester, *search, "--garl-resume", *options)
         assert result.ret == pytest.ExitCode.USAGE_ERROR
         result.stderr.fnmatch_lines([words])
         assert result_hash(pytester) == before
+
+    is_refused("*seed was 0, is 1*", "--garl-seed=1")
+    is_refused("*method was garl, is random*", "--garl-method=random")
+    is_refused("*domain was paper, is calm*", "--garl-domain=calm")
+    pytester.makepyfile(systems=SLOW.replace("0.03", "0.04"))
+    is_refused("*Slow on lawn is not what it was: systems.py changed*")
 
 
 @pytest.fixture
