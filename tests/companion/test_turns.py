@@ -134,6 +134,16 @@ def test_random_numbers_and_the_order_of_sets_are_the_same_in_each_process(tmp_p
     assert printed[0] == printed[1] != ""
 
 
+def test_nothing_that_reads_a_clock_is_loaded_before_the_program(tmp_path: Path) -> None:
+    """What is loaded before keeps real clocks and locks, and shifts when the program begins."""
+    text = """
+        import sys
+        print({"asyncio", "concurrent.futures", "datetime", "logging"} & {*sys.modules})
+    """
+    with running(tmp_path, text) as simulator:
+        assert simulator.fly(0.1).printed == "set()\n"
+
+
 def test_a_loop_that_polls_the_clock_ends(tmp_path: Path) -> None:
     text = """
         import time, threading

@@ -39,7 +39,7 @@ def load_inside() -> Any:
     package = importlib.util.module_from_spec(spec)
     sys.modules[NAME] = package
     spec.loader.exec_module(package)
-    for each in ("offspring", "turns", "network", "sight", "mavsdk_system"):
+    for each in ("offspring", "turns", "network", "sight"):
         importlib.import_module(f"{NAME}.{each}")
     return package
 
@@ -202,7 +202,9 @@ def install(host: Host) -> None:
         for name in ("apriltag", "dt_apriltags", "pupil_apriltags", "pyapriltags")
     }
 
-    mavsdk = sys.modules[f"{NAME}.mavsdk_system"].change_mavsdk
+    def mavsdk(module: Any) -> None:
+        # It imports asyncio, which has to find the flight's time.
+        importlib.import_module(f"{NAME}.mavsdk_system").change_mavsdk(module)
 
     def no_process(name: str) -> Any:
         return turns.refusing(f"calls multiprocessing's {name}", "threading.Thread, or subprocess")
