@@ -9,6 +9,8 @@ from __future__ import annotations
 import argparse
 import csv
 import dataclasses
+import os
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -97,7 +99,10 @@ def main() -> None:
     parser.add_argument("files", nargs="*", type=Path, help="saved cases (default: all)")
     parser.add_argument("--out", type=Path, help="the CSV file to write")
     asked = parser.parse_args()
-    cpu_dispatch.pin()
+    if not cpu_dispatch.was_started_for_flights():
+        # NumPy is loaded by now, and has chosen its instructions.
+        environment = {**os.environ, **cpu_dispatch.environment()}
+        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], environment)
     folder = Path.cwd()
     rows = [
         flown(load_case(file), by, folder)
@@ -106,7 +111,9 @@ def main() -> None:
     ]
     if asked.out is not None:
         with asked.out.open("w", newline="", encoding="utf-8") as out:
-            writer = csv.DictWriter(out, [field.name for field in dataclasses.fields(Row)])
+            writer = csv.DictWriter(
+                out, [field.name for field in dataclasses.fields(Row)], lineterminator="\n"
+            )
             writer.writeheader()
             writer.writerows(map(dataclasses.asdict, rows))
     print(report(rows))

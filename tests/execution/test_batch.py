@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.engine import VARIABLE
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
@@ -17,6 +18,9 @@ from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import Good, Replaces, job_of, scenario
+from tests.support.blind_lander import job_of as job_of_blind_lander
+from tests.support.blind_lander import scenario_with
+from tests.support.engines import NEEDS_MUJOCO
 from tests.support.results import flight_result
 
 JOB = FlightJob.for_system(
@@ -96,3 +100,22 @@ def test_flight_does_not_see_replacements_by_another_system(tmp_path: Path) -> N
         before = hash_of(Good, 1.0)
         assert hash_of(Replaces, 1.0) == "bent"
         assert hash_of(Good, 2.0) == before
+
+
+@NEEDS_MUJOCO
+@pytest.mark.sim
+def test_flights_by_mujoco_are_the_same_with_one_worker_and_with_two(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, "mujoco")
+    job = job_of_blind_lander("waypoint", tmp_path)
+    assert job.engine == "mujoco"
+    scenarios = [scenario_with("dog-1", velocity) for velocity in (0.2, 1.0)]
+
+    def hashes(workers: int) -> list[str]:
+        with temporary_pool(workers) as (ledger, pool):
+            return [done.sha256 for done in fly_all(ledger, pool, job, scenarios)]
+
+    first = hashes(1)
+    assert "" not in first
+    assert hashes(2) == first
