@@ -19,6 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from pytest_garl.engine import chosen
 from pytest_garl.npcs.policy_catalogue import scripted_policies
 
 OURS = "pytest_garl"
@@ -34,7 +35,7 @@ FLYING = (
     "simulation.system_under_test.reference_pilot",
     "verdicts.judge",
 )
-"""Modules that a flight imports; they import the rest."""
+"""Modules that a flight imports beside the world of its engine; they import the rest."""
 SHARED = {
     *("cv2", "json", "math", "mujoco", "numpy", "os", "pathlib", "pybullet"),
     *("random", "struct", "time"),
@@ -68,7 +69,7 @@ class ProcessState:
     """
 
     def __init__(self) -> None:
-        for name in FLYING:
+        for name in (*FLYING, f"simulation.physics.{chosen()}_world"):
             importlib.import_module(f"{OURS}.{name}")
         self._namespaces = [(space, dict(values)) for space, values in _namespaces()]
         self._settings = _settings()

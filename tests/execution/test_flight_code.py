@@ -86,7 +86,7 @@ def test_physics_camera_recorded_moves_and_verdicts_fly_and_judge() -> None:
 def test_no_module_of_the_search_or_of_pytest_flies() -> None:
     rooms = {name.split(".")[1] for name in flown_modules()}
     assert rooms <= {
-        *("airframe", "commands", "cpu_dispatch", "distortion", "fiducial", "files"),
+        *("airframe", "commands", "cpu_dispatch", "distortion", "engine", "fiducial", "files"),
         *(
             "flight",
             "foreign_text",

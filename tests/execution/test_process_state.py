@@ -25,6 +25,9 @@ from pytest_garl.simulation import contacts, loop
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import LAWN, Good, job_of, scenario
+from tests.support.engines import engine
+
+__all__ = ["engine"]
 
 
 @pytest.fixture
@@ -143,6 +146,7 @@ def test_running_process_is_noticed(state: ProcessState) -> None:
         left.communicate(b"\n")
 
 
+@pytest.mark.usefixtures("engine")
 def test_flight_imports_no_module_of_this_package_after_the_state_is_taken(tmp_path: Path) -> None:
     """A landing system could replace functions of such a module, and nobody would notice."""
     job = FlightJob.for_system(

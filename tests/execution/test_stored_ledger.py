@@ -81,7 +81,11 @@ SCENARIO = "UPDATE slot SET scenario = ? WHERE slot = 1"
         (RESULT, _verdict(margins=[MARGIN | {"value": None}]), r"margins\[0\].value: found None"),
         (RESULT, _changed(crash={"kind": "raised"}), "crash: found other keys than expected"),
         (RESULT, None, "slot 0/0 of a: found the state flown without a result"),
-        (JOB, "{}", "search 'a': the value: found other keys than expected: flights, limits"),
+        (
+            JOB,
+            "{}",
+            "search 'a': the value: found other keys than expected: engine, flights, limits",
+        ),
         (JOB, _job(lambda job: job.update(timeout_s="1")), "timeout_s: found '1', expected a fin"),
         (JOB, _job(lambda job: job["limits"].update(time_s=1e9)), "limits: found time_s=1000000"),
         (JOB, _job(lambda job: job["npcs"].update(arguments=[["a"]])), "npcs.arguments.0.: found"),
