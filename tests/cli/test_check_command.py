@@ -102,8 +102,8 @@ def garl(*arguments: str) -> Result:
 def test_check_prints_its_observations_and_exits_with_zero() -> None:
     done = garl("checked_stack:Climbs", "--seconds=2", "--map=lawn", "--map=court")
     assert done.exit_code == 0, done.output
-    assert "Climbs: lawn: Not landed" in done.output
-    assert "Climbs: court: Not landed" in done.output
+    assert "Climbs: lawn: cut off" in done.output
+    assert "Climbs: court: cut off" in done.output
     # The same on both maps is one warning.
     assert done.output.count("warning: returns no diagnostics") == 1
 
@@ -118,8 +118,8 @@ def test_check_exits_with_one_if_a_system_does_not_land(tmp_path: Path) -> None:
 def test_check_takes_systems_and_maps_from_the_tests_of_a_file_and_runs_none() -> None:
     done = garl("test_checked.py", "--seconds=1")
     assert done.exit_code == 0, done.output
-    lines = [line for line in done.output.splitlines() if ": Not landed" in line]
-    flown = [line.partition(": Not landed")[0] for line in lines]
+    lines = [line for line in done.output.splitlines() if ": cut off" in line]
+    flown = [line.partition(": cut off")[0] for line in lines]
     assert flown == [
         "Climbs: court",
         "Climbs: court, another scenario",
