@@ -41,7 +41,7 @@ from pytest_garl.plugin.target import Target
 from pytest_garl.plugin.terminal_text import counted
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.domains.own_navigation import within
-from pytest_garl.scenarios.files import dump_scenario
+from pytest_garl.scenarios.files import dumps
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import Verdict
@@ -124,10 +124,11 @@ class ProbesItem(pytest.Item):
             violated_probes=tuple(f"{system} on {map}: {each.line}" for each in flown.violated),
         ).add_to(self)
         lines = [f"{system} violates {number} on {map}:", *lines]
+        place = load_map(map, run.options.map_folders)
         for each in flown.violated:
             file = write_text_atomically(
                 run.options.folder / "probes" / f"{map}-{each.probe.name}.toml",
-                dump_scenario(each.probe.scenario),
+                dumps(each.probe.scenario, place),
             )
             repeat = f"--garl-repeat={shown_path(file, self.config)}"
             lines.append(f"fly it: {command('pytest', shown_path(self.path, self.config), repeat)}")

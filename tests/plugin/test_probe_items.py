@@ -15,9 +15,10 @@ import pytest
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin import probe_items
 from pytest_garl.plugin.probe_items import PASSED, excusing_case, has_cause_of, passed_before
+from pytest_garl.scenarios.files import load
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.task import Task
-from pytest_garl.search.probes import clear_scenario
+from pytest_garl.search.probes import GONE_S, clear_scenario
 from tests.cases.samples import case
 from tests.search.test_probes import FIELD
 from tests.support import probed_landers
@@ -100,7 +101,12 @@ def test_a_violated_probe_is_red_again(
             "fly it: pytest test_it.py --garl-repeat=.garl/probes/lawn-no-marker.toml",
         ]
     )
-    assert (pytester.path / ".garl" / "probes" / "lawn-no-marker.toml").is_file()
+    file = ".garl/probes/lawn-no-marker.toml"
+    repeated = pytester.runpytest_subprocess(f"--garl-repeat={file}", "--garl-workers=0")
+    repeated.assert_outcomes(passed=2)
+    repeated.stdout.fnmatch_lines([f"garl: repeating {file}"])
+    as_saved = load(pytester.path / file)
+    assert as_saved["cover.lasts_s"] == GONE_S
     assert "\nProbe: ZeroByDefault on lawn: no-marker: FAILED: " in step.read_text()
     assert collected(pytester, "first")[0] == ITEM.format("ZeroByDefault")
 
