@@ -19,6 +19,7 @@ from typing import Any, Literal, get_args
 from pytest_garl.airframe import Airframe
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.landing_system import (
+    Abort,
     Command,
     Diagnostics,
     Land,
@@ -52,6 +53,8 @@ MODES: Mapping[str, int] = {
 HOLDING = ("STABILIZE", "ALT_HOLD", "LOITER", "POSHOLD", "BRAKE")
 FACE_BEYOND_M = 2.0
 """The nose turns towards a goal that is at least so far away, as with ``WP_YAW_BEHAVIOR`` 1, 2."""
+MARKER_WITHIN_M = 7.5
+"""So far from ``Mission.gps_position_m`` the marker lies at most."""
 RATE_TIMEOUT_S = 3.0
 """A yaw rate that is not renewed ends, as a velocity does."""
 NEAR_M, STILL_S = 1.0, 3.0
@@ -149,6 +152,7 @@ class Autopilot:
         self._goal: Vector | None = None
         self._turn: tuple[float, float] = (0.0, 0.0)
         self._return: Callable[[VehicleState], None] | None = None
+        self._is_home = False
         self._near_s: float | None = None
         self.told: list[str] = []
         """What STATUSTEXT shall say next."""
@@ -230,6 +234,7 @@ class Autopilot:
         if mode == self.mode:
             return True
         self.mode, self._return, self._turn = mode, None, (0.0, 0.0)
+        self._is_home = False
         if mode == "LAND":
             self._control.land()
         elif mode == "RTL":
@@ -371,7 +376,12 @@ class Autopilot:
         return thrusts
 
     def command(self, told: Diagnostics) -> Command:
-        """Return what the vehicle does, for the record: the motors are flown by ``control``."""
+        """Return what the vehicle does, for the record: the motors are flown by ``control``.
+
+        To be back over a home where the marker cannot lie is to have given up the landing.
+        """
+        if self._is_home:
+            return Abort(diagnostics=told)
         comes_down = self._control.mode == "land" or (self._goal is not None and self.landed)
         if comes_down and self._control.mode != "take-off":
             return Land(diagnostics=told)
@@ -404,6 +414,8 @@ class Autopilot:
                 if math.dist(state.position_m, legs[0]) < NEAR_M:
                     legs.pop(0)
                     arrived.append(state.time_s)
+                    away_m = math.dist(self.home_m[:2], self._mission.gps_position_m)
+                    self._is_home = not legs and away_m > MARKER_WITHIN_M
             elif state.time_s - arrived[-1] > stay_s:
                 self._return = None
                 self._control.land()

@@ -9,16 +9,16 @@ from typing import Any
 import pytest
 
 from pytest_garl.airframe import Airframe
-from pytest_garl.landing_system import Diagnostics, Land, Mission, PositionSetpoint
+from pytest_garl.landing_system import Abort, Diagnostics, Land, Mission, PositionSetpoint
 from pytest_garl.vehicle.autopilot import ArduCopter, Autopilot
 from tests.companion.processes import mission
 from tests.support.bare_flight import Trace, fly_bare
 
 
-def at_origin() -> Mission:
+def at_origin(marker_m: tuple[float, float] = (6.0, 3.0)) -> Mission:
     given = mission()
     return Mission(
-        gps_position_m=(6.0, 3.0),
+        gps_position_m=marker_m,
         home_m=(0.0, 0.0, 0.2),
         search_altitude_m=5.0,
         marker_id=given.marker_id,
@@ -34,11 +34,12 @@ def flown(
     seconds: float,
     vehicle: ArduCopter | None = None,
     start_m: float = 0.0,
+    marker_m: tuple[float, float] = (6.0, 3.0),
 ) -> tuple[Trace, Autopilot]:
     made: list[Autopilot] = []
 
     def make(airframe: Airframe) -> Any:
-        made.append(Autopilot(airframe, at_origin(), vehicle or ArduCopter()))
+        made.append(Autopilot(airframe, at_origin(marker_m), vehicle or ArduCopter()))
         return made[0]
 
     def order(time_s: float, pilot: Autopilot) -> None:
@@ -173,6 +174,24 @@ def test_rtl_climbs_returns_and_lands() -> None:
     assert trace.position_m[:, 2].max() == pytest.approx(6.2, abs=0.2)
     assert trace.position_m[-1, :2] == pytest.approx((0.0, 0.0), abs=0.2)
     assert not pilot.armed
+
+
+@pytest.mark.parametrize(("marker_m", "gives_up"), [((12.0, 0.0), True), ((6.0, 3.0), False)])
+def test_to_be_back_home_is_to_have_given_up_where_no_marker_can_be(
+    marker_m: tuple[float, float], gives_up: bool
+) -> None:
+    said: list[type] = []
+
+    def orders(time_s: float, pilot: Autopilot) -> None:
+        if time_s < 2.0:
+            pilot.go_to((4.0, 0.0, 4.0))
+        else:
+            pilot.set_mode("RTL")
+        said.append(type(pilot.command(Diagnostics())))
+
+    flown(orders, 14.0, ArduCopter(parameters={"RTL_ALT": 600}), 4.0, marker_m)
+    assert said[0] is PositionSetpoint
+    assert (Abort in said) == gives_up
 
 
 def test_the_pilot_flies_to_the_coordinate_and_switches_to_land() -> None:
