@@ -32,7 +32,8 @@ WHOLE = {"all", "any", "bool", "count_publishers", "endswith", "int", "isinstanc
     "startswith",
 }
 """Functions and methods that return whole numbers, or whether something is so."""
-WHOLE |= {"collided", "count", "counts", "decided", "met", "npcs", "seen", "unspent"}
+WHOLE |= {"collided", "count", "counts", "decided", "flights", "met", "npcs", "seen", "struck"}
+WHOLE |= {"unspent", "violated"}
 """Names of values and attributes that are whole numbers wherever they are summed."""
 WHOLE_NUMBERS = {
     "map(self._is_bred, range(plan.population))",

@@ -90,7 +90,7 @@ def garl(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 def test_replaced_judge_bends_no_check(tmp_path: Path) -> None:
     done = garl(tmp_path, "check", "bent_judges:SeesNothing", "--seconds=3")
-    assert "SeesNothing: lawn: Not landed" in done.stdout, done.stdout + done.stderr
+    assert "SeesNothing: lawn: cut off" in done.stdout, done.stdout + done.stderr
     assert "All is well" not in done.stdout
 
 

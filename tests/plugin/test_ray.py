@@ -227,7 +227,11 @@ class TestOnAClusterOfItsOwn:
 
 def test_error_without_ray_says_how_to_install_it(pytester: pytest.Pytester) -> None:
     write_project(pytester.path)
-    hidden = "import importlib.util\nimportlib.util.find_spec = lambda *names: None\n"
+    hidden = (
+        "import importlib.util\n"
+        "find = importlib.util.find_spec\n"
+        "importlib.util.find_spec = lambda name, *rest: name != 'ray' and find(name, *rest) or None\n"
+    )
     pytester.makeconftest(hidden + CONFTEST)
     result = run(pytester, "--garl-budget=8", *WITH_RAY)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
