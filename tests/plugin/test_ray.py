@@ -230,7 +230,7 @@ def test_error_without_ray_says_how_to_install_it(pytester: pytest.Pytester) -> 
     hidden = (
         "import importlib.util\n"
         "find = importlib.util.find_spec\n"
-        "importlib.util.find_spec = lambda name, *rest: name != 'ray' and find(name, *rest) or None\n"
+        "importlib.util.find_spec = lambda name, *of: None if name == 'ray' else find(name, *of)\n"
     )
     pytester.makeconftest(hidden + CONFTEST)
     result = run(pytester, "--garl-budget=8", *WITH_RAY)
