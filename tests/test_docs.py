@@ -98,4 +98,4 @@ def test_site_of_the_pages_has_no_warning(tmp_path: Path) -> None:
     text = (site / "searchindex.js").read_text()
     found = json.loads(text.removeprefix("Search.setIndex(").removesuffix(")"))
     pages = [found["docnames"][place] for place in found["terms"]["garl_budget"]]
-    assert {"README", "docs/ci", "docs/options"} <= {*pages}
+    assert {"docs/ci", "docs/options"} <= {*pages}
