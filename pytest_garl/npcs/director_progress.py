@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 AND_EVENTS = "|"
@@ -67,22 +67,24 @@ class Progress:
     events: EventProgress
 
 
+def _mean(worths: Iterable[float], counts: Sequence[int]) -> float:
+    """Return the mean of what generations say, each as heavy as its count."""
+    products = (worth * count for worth, count in zip(worths, counts, strict=True))
+    return math.fsum(products) / sum(counts)
+
+
 def total(progresses: Iterable[DirectorProgress]) -> DirectorProgress | None:
     """Return what several generations say together; None if no NPC could have begun."""
     found = [each for each in progresses if each.npcs]
-    npcs = sum(each.npcs for each in found)
-    if not npcs:
+    counts = [each.npcs for each in found]
+    if not counts:
         return None
-
-    def mean(worth: str) -> float:
-        return math.fsum(getattr(each, worth) * each.npcs for each in found) / npcs
-
     return DirectorProgress(
-        npcs=npcs,
-        learned=mean("learned"),
-        shipped=mean("shipped"),
-        rule=mean("rule"),
-        best=mean("best"),
+        npcs=sum(counts),
+        learned=_mean((each.learned for each in found), counts),
+        shipped=_mean((each.shipped for each in found), counts),
+        rule=_mean((each.rule for each in found), counts),
+        best=_mean((each.best for each in found), counts),
         seen=sum(each.seen for each in found),
         expected=math.fsum(each.expected for each in found),
         met=sum(each.met for each in found),
@@ -92,18 +94,14 @@ def total(progresses: Iterable[DirectorProgress]) -> DirectorProgress | None:
 def total_of_events(progresses: Iterable[EventProgress]) -> EventProgress | None:
     """Return what several generations say together; None if no event struck."""
     found = [each for each in progresses if each.flights]
-    flights = sum(each.flights for each in found)
+    counts = [each.flights for each in found]
     if not any(each.struck for each in found):
         return None
-
-    def mean(worth: str) -> float:
-        return math.fsum(getattr(each, worth) * each.flights for each in found) / flights
-
     return EventProgress(
-        flights=flights,
-        learned=mean("learned"),
-        rule=mean("rule"),
-        best=mean("best"),
+        flights=sum(counts),
+        learned=_mean((each.learned for each in found), counts),
+        rule=_mean((each.rule for each in found), counts),
+        best=_mean((each.best for each in found), counts),
         struck=sum(each.struck for each in found),
         expected=math.fsum(each.expected for each in found),
         violated=sum(each.violated for each in found),

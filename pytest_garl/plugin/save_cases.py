@@ -122,9 +122,9 @@ def _flight_s(run: Run, requests: Sequence[CaseRequest]) -> dict[str, float]:
     }
 
 
-def saved_lines(investigated: Sequence[InvestigatedSignature], config: pytest.Config) -> list[str]:
+def saved_lines(run: Run, config: pytest.Config) -> list[str]:
     """Return the summary's lines about saved cases."""
-    width = width_of(config)
+    investigated, width = run.investigated, width_of(config)
     lines = [line for each in investigated for line in _lines_about(each, config, width)]
     files = [each.file for each in investigated if each.file is not None]
     patches = [command(shown_path(file, config)) for file in files if file.suffix == _PATCH]
@@ -137,7 +137,8 @@ def saved_lines(investigated: Sequence[InvestigatedSignature], config: pytest.Co
             "FILE`. `garl cases show FILE` says more about a case."
         )
         lines.append(wrapped(hint, width))
-    return [*lines, *_not_shrunk(investigated, width)]
+    shrink = None if run.options.shrink_capped else run.options.shrink
+    return [*lines, *_not_shrunk(investigated, shrink, width)]
 
 
 def _lines_about(each: InvestigatedSignature, config: pytest.Config, width: int) -> list[str]:
@@ -185,14 +186,25 @@ def _is_left(each: InvestigatedSignature) -> bool:
     return not each.result.flights or (case is not None and case.severity.is_guess)
 
 
-def _not_shrunk(investigated: Sequence[InvestigatedSignature], width: int) -> list[str]:
-    """Return how many kinds are not shrunk, and how many flights it takes to shrink them."""
+def _not_shrunk(
+    investigated: Sequence[InvestigatedSignature], shrink: int | None, width: int
+) -> list[str]:
+    """Return how many kinds are not shrunk, and how many flights it takes to shrink them.
+
+    ``shrink`` is how many flights each had if somebody said it.
+    """
     left = sum(_is_left(each) for each in investigated)
     if not left:
         return []
+    if shrink is None:
+        why = (
+            f"By default shrinking has no more flights than the search. --garl-shrink={SHRINK} "
+            f"gives each {SHRINK} (at most {SHRINK * len(investigated)} flights)"
+        )
+    else:
+        why = f"Each had at most {shrink} flights (--garl-shrink={shrink}); more shrink further"
     text = (
-        f"Not shrunk: {left} of {counted(len(investigated), 'violation')}. By default shrinking "
-        f"has no more flights than the search. --garl-shrink={SHRINK} shrinks all of them (at most "
-        f"{SHRINK * len(investigated)} flights); `garl cases shrink FILE` shrinks a saved case."
+        f"Not shrunk: {left} of {counted(len(investigated), 'violation')}. {why}; "
+        "`garl cases shrink FILE` shrinks a saved case."
     )
     return [wrapped(text, width)]

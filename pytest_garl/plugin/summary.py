@@ -47,7 +47,7 @@ def write_run(reporter: Any, run: Run, tally: Tally) -> None:
             reporter.write_line(line)
     lines = [
         *_excused_lines(tally, width_of(reporter.config)),
-        *saved_lines(run.investigated, reporter.config),
+        *saved_lines(run, reporter.config),
         *([f"nothing more was saved: {run.save_problem}"] if run.save_problem else []),
         *_passing_cases(reporter),
         *renewal_lines(reporter),

@@ -193,17 +193,13 @@ def movers_text(search: SearchRecord) -> str:
     movers = search.movers
     if movers is None:
         return ""
-    found = [
-        f"{name} for {count}"
-        for name, count in (
-            ("the learned director", movers.director),
-            ("the rule (just in time)", movers.rule),
-            ("their genes", movers.gene),
-            (f"the policy {' and '.join(search.npcs)}", movers.policy),
-        )
-        if count
-    ]
-    told = f"who said when NPCs begin: {', '.join(found)}"
+    who = _each_for(
+        ("the learned director", movers.director),
+        ("the rule (just in time)", movers.rule),
+        ("their genes", movers.gene),
+        (f"the policy {' and '.join(search.npcs)}", movers.policy),
+    )
+    told = f"who said when NPCs begin: {who}"
     if not movers.directed:
         return told
     return (
@@ -241,16 +237,17 @@ def strikes_text(search: SearchRecord) -> str:
     strikes = search.strikes
     if strikes is None:
         return ""
-    found = [
-        f"{name} for {count}"
-        for name, count in (
-            ("the learned director", strikes.director),
-            ("the rule (at 3 m)", strikes.rule),
-            ("their genes", strikes.gene),
-        )
-        if count
-    ]
-    return f"who said when events strike: {', '.join(found)}"
+    who = _each_for(
+        ("the learned director", strikes.director),
+        ("the rule (at 3 m)", strikes.rule),
+        ("their genes", strikes.gene),
+    )
+    return f"who said when events strike: {who}"
+
+
+def _each_for(*shares: tuple[str, int]) -> str:
+    """Return names with their numbers, without those of none."""
+    return ", ".join(f"{name} for {count}" for name, count in shares if count)
 
 
 def event_director_text(search: SearchRecord) -> str:

@@ -141,7 +141,8 @@ class Server:
         module, name = self.module(plugin), plugin.capitalize()
         result = getattr(module, f"{name}Result")
         found = result(result.Result[kind], kind.replace("_", " ").capitalize())
-        return getattr(module, f"{name}Error")(found, f"{origin}()")  # type: ignore[no-any-return]
+        error: Exception = getattr(module, f"{name}Error")(found, f"{origin}()")
+        return error
 
     async def set_mode(self, plugin: str, origin: str, px4: tuple[int, int], other: int) -> None:
         """Enter a mode by its numbers in PX4 and in ArduPilot."""

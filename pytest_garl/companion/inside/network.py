@@ -12,9 +12,11 @@ import socket
 import sys
 import types
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 from .turns import Task, Turns
+
+T = TypeVar("T")
 
 POLL_S = 100e-6
 """What a look at an empty socket takes: loops that poll shall end."""
@@ -72,7 +74,7 @@ class Network:
         self._port += 1
         return self._port
 
-    def wait(self, ready: Callable[[], Any], ends: list[Socket], timeout: float | None) -> Any:
+    def wait(self, ready: Callable[[], T], ends: list[Socket], timeout: float | None) -> T:
         """Wait until ``ready`` returns something, or a time is over; it depends on ``ends``."""
         turns = self.turns
         found = ready()
@@ -340,13 +342,13 @@ class Selection:
         inside = self._ends or len(self._writes) > len(self._real_writes)
         inside = inside or not network.pipes.isdisjoint(map(_number, self._real))
         if not inside and (self._real or self._real_writes):
-            found = _real_select(self._real, self._real_writes, [], timeout)
-            return found[0], found[1]
+            reads, writes, _ = _real_select(self._real, self._real_writes, [], timeout)
+            return reads, writes
         until_s = math.inf if timeout is None else network.turns.now_s + timeout
         while self._real and until_s - network.turns.now_s > PIPE_S:
             # Nobody tells of real files.
             if found := network.wait(self._ready, self._ends, PIPE_S):
-                return found  # type: ignore[no-any-return]
+                return found
         rest_s = None if timeout is None else max(until_s - network.turns.now_s, 0.0)
         return network.wait(self._ready, self._ends, rest_s) or ([], [])
 
