@@ -8,13 +8,12 @@ find it again: "module:name" is its id in ledgers, cases and baselines, as of a 
 from __future__ import annotations
 
 import abc
-import contextlib
 import hashlib
 import os
 import re
 import signal
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 from types import FrameType
@@ -192,23 +191,6 @@ def end_in_words(status: int) -> tuple[str, str]:
     known = -status in {*signal.Signals}
     name = f" ({signal.Signals(-status).name})" if known else ""
     return f"signal-{-status}", f"signal {-status}{name}"
-
-
-def started_by(pid: int) -> list[int]:
-    """Return the ids of all processes below one, in any session, where the system tells (Linux)."""
-    found = [pid]
-    for each in found:
-        for file in Path(f"/proc/{each}/task").glob("*/children"):
-            with contextlib.suppress(OSError):
-                found += [int(child) for child in file.read_text().split()]
-    return found[1:]
-
-
-def kill(pids: Iterable[int]) -> None:
-    """Kill processes; those that have ended are left out."""
-    for pid in pids:
-        with contextlib.suppress(OSError):
-            os.kill(pid, signal.SIGKILL)
 
 
 def _making_module() -> dict[str, Any]:

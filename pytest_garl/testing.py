@@ -18,7 +18,6 @@ from pytest_garl.execution.exit_guard import refusing_end
 from pytest_garl.execution.fly_and_judge import time_limit_s
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.metering import CallMeter, OutOfTimeError
-from pytest_garl.execution.processes import descendants_of
 from pytest_garl.execution.reference import check_system
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.separate_process import call_in_separate_process
@@ -37,6 +36,7 @@ from pytest_garl.landing_system import (
 )
 from pytest_garl.npcs.domain_policy import domain_with_policy
 from pytest_garl.npcs.policy_catalogue import policy_spec
+from pytest_garl.process_tree import descendants_of
 from pytest_garl.program import AnySystem, ProgramSystem
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.genome import genome_of

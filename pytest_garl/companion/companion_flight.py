@@ -35,7 +35,8 @@ from pytest_garl.landing_system import (
     Observation,
     VehicleState,
 )
-from pytest_garl.program import ProgramFailedError, end_in_words, kill, started_by
+from pytest_garl.process_tree import descendants_of, kill
+from pytest_garl.program import ProgramFailedError, end_in_words
 from pytest_garl.vehicle.autopilot import ArduCopter
 from pytest_garl.vehicle.mavlink import MavlinkLink
 from pytest_garl.vehicle.ned import on_globe
@@ -318,7 +319,7 @@ class CompanionProcess:
     def close(self) -> None:
         """Kill the process, what it has started, and what is left of its group."""
         self._wait.close()
-        kill(started_by(self._process.pid))
+        kill(descendants_of(self._process.pid))
         with contextlib.suppress(OSError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.kill()

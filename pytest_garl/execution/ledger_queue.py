@@ -13,8 +13,8 @@ from pytest_garl.execution.database import Database
 from pytest_garl.execution.facts import Facts
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.job import parse_job
-from pytest_garl.execution.processes import alive
 from pytest_garl.execution.result import FlightResult
+from pytest_garl.process_tree import alive
 
 _METERS = {"search": "flights", "case": "cases", "on_demand": "on_demand"}
 _NEXT, _NEXT_OF_SYSTEM = (

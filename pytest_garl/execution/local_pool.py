@@ -24,14 +24,9 @@ from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.processes import (
-    Heartbeat,
-    WorkerReport,
-    create_report_file,
-    descendants_of,
-    read_report,
-)
+from pytest_garl.execution.processes import Heartbeat, WorkerReport, create_report_file, read_report
 from pytest_garl.execution.worker_failure import WorkerExit, call_limit_s, retry_or_record
+from pytest_garl.process_tree import descendants_of, kill
 from pytest_garl.scenarios.files import parse_scenario
 
 SILENT_LIMITS = 3
@@ -110,9 +105,7 @@ class _Worker:
         """Kill the process and all below it: stopped, it cannot end them itself."""
         below = descendants_of(self.process.pid)
         self._end_session()
-        for pid in below:
-            with contextlib.suppress(OSError):
-                os.kill(pid, signal.SIGKILL)
+        kill(below)
         self.process.wait()
 
     def _end_session(self) -> None:
@@ -322,9 +315,7 @@ class InProcessPool:
 
 def _end_those_since(before: set[int]) -> None:
     """End the processes that a flight has left below this one: one of them holds the lock."""
-    for pid in descendants_of(os.getpid()) - before:
-        with contextlib.suppress(OSError):
-            os.kill(pid, signal.SIGKILL)
+    kill(descendants_of(os.getpid()) - before)
 
 
 @contextlib.contextmanager

@@ -31,13 +31,11 @@ from pytest_garl.execution.processes import (
     Parent,
     WorkerReport,
     adopt_orphans,
-    alive,
-    children_of,
-    descendants_of,
     end_with_parent,
     failure_text,
     ignore_ctrl_c,
 )
+from pytest_garl.process_tree import alive, children_of, descendants_of, kill
 
 STDERR_WAIT_MS = 50
 """How long the supervisor waits for stderr before it looks at the limits again."""
@@ -312,9 +310,7 @@ class _Supervisor:
     def _end_what_is_left(self) -> bool:
         """End the processes that a flight has left; return whether there were any."""
         left = descendants_of(getpid()) - {self._flying}
-        for pid in left:
-            with contextlib.suppress(OSError):
-                os.kill(pid, signal.SIGKILL)
+        kill(left)
         until = monotonic() + ENDING_S
         while monotonic() < until and any(alive(pid) for pid in left):
             sleep(0.002)
@@ -359,9 +355,7 @@ def end_descendants() -> None:
     """Kill all processes below this one, in any session; orphans among them come to this one."""
     until = monotonic() + ENDING_S
     while monotonic() < until:
-        for pid in children_of(getpid()):
-            with contextlib.suppress(OSError):
-                os.kill(pid, signal.SIGKILL)
+        kill(children_of(getpid()))
         try:
             while os.waitpid(-1, os.WNOHANG)[0]:
                 pass

@@ -18,7 +18,8 @@ from typing import IO, Literal
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.messages import shortened
-from pytest_garl.program import ProgramFailedError, end_in_words, kill, started_by
+from pytest_garl.process_tree import descendants_of, kill
+from pytest_garl.program import ProgramFailedError, end_in_words
 
 LONGEST_LINE = 2**20
 """Bytes of an answer: 1,000 points of a path and 100 detections take a tenth."""
@@ -170,7 +171,7 @@ class Child:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    started = started_by(process.pid)
+    started = descendants_of(process.pid)
     with contextlib.suppress(OSError):
         if process.stdin is not None:
             process.stdin.close()

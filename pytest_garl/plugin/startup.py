@@ -17,7 +17,6 @@ from pytest_garl.execution.facts import Facts
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.processes import alive
 from pytest_garl.execution.ray.ray_pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, package_sha256, reference_to
 from pytest_garl.execution.stored_ledger import check_stored, stored_flight_s
@@ -28,6 +27,7 @@ from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.termination import interrupt_on_sigterm
 from pytest_garl.plugin.xdist import is_xdist_worker
+from pytest_garl.process_tree import alive
 from pytest_garl.search.archive import Archive, read_archive
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.cases.corpus import Corpus
-from pytest_garl.execution.processes import any_command_contains
+from pytest_garl.process_tree import any_command_contains
 from tests.support.broken_lander import case_of_broken_lander
 
 SLOW = """

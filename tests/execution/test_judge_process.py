@@ -20,10 +20,10 @@ from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool, temporary_pool
 from pytest_garl.execution.on_demand import fly_all
-from pytest_garl.execution.processes import alive, descendants_of
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
+from pytest_garl.process_tree import alive, descendants_of
 from pytest_garl.simulation.system_under_test.calls import crash_of
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import Good, job_of, scenario

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.execution.processes import alive, any_command_contains
+from pytest_garl.process_tree import alive, any_command_contains
 
 STARTS_A_WORKER = """
 import sys, time

@@ -10,8 +10,8 @@ import pytest
 
 from pytest_garl import Camera, Command, Mission, Observation, PositionSetpoint
 from pytest_garl.errors import LandingSystemError
-from pytest_garl.execution.processes import any_command_contains
 from pytest_garl.external.external_program import ExternalProgram
+from pytest_garl.process_tree import any_command_contains
 from pytest_garl.simulation.fly import fly
 from tests.external.programs import CLIENTS, RISES, at_once, flown, written
 from tests.support.flights import EMPTY, STAND, nominal

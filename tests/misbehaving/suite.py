@@ -22,9 +22,9 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import temporary_pool
 from pytest_garl.execution.on_demand import fly_all
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.processes import any_command_contains
 from pytest_garl.execution.reference import BUILT_IN
 from pytest_garl.npcs.policy_catalogue import policy_spec
+from pytest_garl.process_tree import any_command_contains
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import LAWN, job_of, scenario

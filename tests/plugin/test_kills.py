@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.processes import any_command_contains, children_of
+from pytest_garl.process_tree import any_command_contains, children_of
 from tests.plugin.test_resume import SLOW, query
 from tests.support.landing_project import CONFTEST, write_project
 

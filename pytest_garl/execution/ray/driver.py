@@ -22,14 +22,10 @@ from typing import Any
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.ledger_queue import WorkQueue
-from pytest_garl.execution.processes import (
-    Parent,
-    WorkerReport,
-    any_command_contains,
-    run_worker,
-)
+from pytest_garl.execution.processes import Parent, WorkerReport, run_worker
 from pytest_garl.execution.ray.actor import ActorWorkspace
 from pytest_garl.execution.ray.scheduler import RayScheduler
+from pytest_garl.process_tree import any_command_contains
 
 CONNECT_S = 180.0
 """How long Ray may take to connect and to upload the project; Ray itself has no limit."""
