@@ -38,6 +38,7 @@ HASHED = (
     "foreign_text.py",
     "landing_system.py",
     "npcs",
+    "process_tree.py",
     "program.py",
     "scenarios",
     "search",
