@@ -26,8 +26,8 @@ class RunProgress:
     """How many violations of each type were found."""
     nearest: Mapping[str, tuple[float, str]]
     """The smallest margin of each property, with its unit."""
-    seconds: float
-    """Since flying began."""
+    flights_per_s: float | None = None
+    """How fast they are flown; None before two readings."""
     selected: int = 0
     """Flights that the selected tests need, those of searches that have not begun included."""
     flown_after: float = 0
@@ -91,8 +91,8 @@ class RunProgress:
                 phrases.append(f"shrinking {counted(self.investigated, 'kind')} beside it")
         elif self.after_search:
             phrases.append("confirming and shrinking" if self.shrinks else "repeating")
-        if self.flown and self.seconds > 0:
-            phrases.append(f"{self.flown / self.seconds:.2f} flights/s")
+        if self.flights_per_s is not None:
+            phrases.append(f"{self.flights_per_s:.2f} flights/s")
         margins = [
             f"{name} {self.nearest[name][0]:.2g} {self.nearest[name][1]}"
             for name in _MARGINS
@@ -121,12 +121,13 @@ class ProgressReader:
 
     def __init__(self, run: Run, every_s: float) -> None:
         self._run, self._every_s = run, every_s
-        self._last_read = self._began = 0.0
+        self._last_read = 0.0
+        self._first: tuple[float, float] | None = None
         self._time_left, self._share = TimeLeft(run), 0.0
 
     def start_clock(self) -> None:
-        """Read nothing for ``every_s`` seconds; the forecast counts the flights of that time."""
-        self._began = self._last_read = time.monotonic()
+        """Read nothing for ``every_s`` seconds."""
+        self._last_read = time.monotonic()
 
     def read(self, ledger: Ledger) -> RunProgress | None:
         """Return the progress if it is time to show it, and if there is any."""
@@ -138,14 +139,12 @@ class ProgressReader:
         searches, selected = queries.progress(), ledger.facts.selected
         if not searches:
             return None
-        self._began = self._began or now
         forecast = self._time_left.forecast(ledger, now)
         investigations = self._run.investigations
         progress = RunProgress(
             searches=searches,
             kinds=queries.violation_counts(),
             nearest=queries.nearest(),
-            seconds=now - self._began,
             selected=selected,
             flown_after=queries.meters().get("on_demand", 0),
             expected_after=forecast.flights_after,
@@ -156,4 +155,13 @@ class ProgressReader:
         )
         # What is expected grows with each new kind; the bar does not go back.
         self._share = max(self._share, progress.share)
-        return dataclasses.replace(progress, least_share=self._share)
+        return dataclasses.replace(
+            progress, least_share=self._share, flights_per_s=self._rate(progress.flown, now)
+        )
+
+    def _rate(self, flown: float, now: float) -> float | None:
+        """Return the flights per second since the first reading: a run may continue another."""
+        if self._first is None:
+            self._first = now, flown
+        began, before = self._first
+        return (flown - before) / (now - began) if now > began and flown > before else None

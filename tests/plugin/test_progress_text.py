@@ -26,7 +26,7 @@ PROGRESS = RunProgress(
     searches=TWO,
     kinds={"I": 2, "IV": 1},
     nearest={"time": (90.3, "s"), "collision": (0.25, "m"), "crash": (1.0, "1")},
-    seconds=8.0,
+    flights_per_s=0.5,
     expected_after=8.0,
     left_s=24.0,
 )
@@ -39,7 +39,7 @@ def test_line_tells_the_flights_that_shrink_from_those_of_the_search() -> None:
     )
     more = dataclasses.replace(PROGRESS, selected=40)
     assert "4/40 flights, 0/~8 to shrink" in progress_line(more, 160)
-    new = RunProgress(searches=TWO[1:], kinds={}, nearest={}, seconds=0.0)
+    new = RunProgress(searches=TWO[1:], kinds={}, nearest={})
     assert progress_line(new, 160) == "garl [#####---------------]  1/4 flights  A on lawn g00 1/4"
 
 
@@ -114,11 +114,14 @@ def read(reader: ProgressReader, queries: Flown) -> RunProgress:
     return found
 
 
-def test_first_log_line_counts_the_time_before_it(clock: Clock) -> None:
+def test_rate_counts_what_was_flown_since_the_first_reading(clock: Clock) -> None:
+    """A reader may begin with a run that is half over, or with a ledger that a run continues."""
     reader = reader_of(1, RemainingWork(at_most=0, flights=0.0, seconds=0.0))
     reader.start_clock()
     clock.now += 30.0
-    assert read(reader, Flown(flown=1)).seconds == 30.0
+    assert read(reader, Flown(flown=20)).flights_per_s is None
+    clock.now += 30.0
+    assert read(reader, Flown(flown=23)).flights_per_s == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -197,7 +200,6 @@ def test_line_follows_the_forecast_once_there_is_one() -> None:
         searches=[done],
         kinds={"IV": 3},
         nearest={},
-        seconds=8.0,
         flown_after=2,
         expected_after=12,
         left_s=33,
