@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from pytest_garl.cases.removed import NOTHING
 from pytest_garl.engine import TITLES, Engine, chosen
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.npcs.recorded import recorded_spec
@@ -250,8 +251,18 @@ class Case:
     @property
     def shrinking(self) -> str:
         """What shrinking removed, in words, or that the case was not shrunk."""
-        is_tried = self.evidence.removed != "nothing" or not self.severity.about
+        is_tried = self.evidence.removed != NOTHING or not self.severity.about
         return f"shrinking removed {self.removed}" if is_tried or self.is_shrunk else "not shrunk"
+
+    @property
+    def without_flights(self) -> str:
+        """What a case is that no flight has shrunk, in words.
+
+        What cannot act was taken away before, and the known causes if it fails without them.
+        """
+        if self.evidence.removed == NOTHING:
+            return "as the search found it, not shrunk"
+        return f"not shrunk; it lacks {self.removed} of the flight that was found"
 
     @property
     def of_another_engine(self) -> str:

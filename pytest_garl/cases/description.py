@@ -51,7 +51,7 @@ def unusual_in_flight(severity: Severity) -> str:
     if not severity.about:
         return ""
     if not severity.unusual:
-        return "Nothing was unusual in this flight."
+        return "Nothing was unusual in this flight, unless it is where the marker lies."
     return f"Unusual in this flight: {severity.unusual}."
 
 

@@ -169,7 +169,7 @@ def _seen(each: InvestigatedSignature) -> str:
 def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:
     """Return in words how robust and preventable a case is, and how many flights it took."""
     if not each.result.flights:
-        return ["as the search found it, not shrunk"]
+        return [case.without_flights]
     return [
         *([case.robustness] if case.robustness else []),
         *([case.prevention.text] if case.prevention.text else []),

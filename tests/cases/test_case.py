@@ -108,6 +108,15 @@ def test_a_case_that_was_not_shrunk_is_not_said_to_have_lost_nothing() -> None:
     assert case().shrinking == "shrinking removed 3 of 4 objects"
 
 
+def test_a_case_without_flights_says_what_it_lacks_of_the_flight_that_was_found() -> None:
+    """The twin of a violation without all known causes is no flight that the search found."""
+    nothing = dataclasses.replace(case().evidence, removed="nothing")
+    found = dataclasses.replace(case(), evidence=nothing)
+    assert found.without_flights == "as the search found it, not shrunk"
+    lacks = "not shrunk; it lacks 3 of 4 objects of the flight that was found"
+    assert case().without_flights == lacks
+
+
 @pytest.mark.parametrize(
     ("removed", "marker_x", "text"),
     [

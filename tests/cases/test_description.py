@@ -51,4 +51,6 @@ def test_description_of_a_violation_without_conditions_says_that_nothing_was_unu
     told = describe(hits_a_person(), verdict, nothing, is_shrunk=True)
     assert told == "Nothing unusual: Gave up."
     told = describe(hits_a_person(), verdict, nothing)
-    assert told == "Nothing was unusual in this flight. Gave up."
+    assert told == (
+        "Nothing was unusual in this flight, unless it is where the marker lies. Gave up."
+    )
