@@ -90,6 +90,27 @@ def test_failure_on_an_edge_steps_back_to_a_robust_one() -> None:
     assert result.case.reason == ""
 
 
+OUTAGE = {"outage.after": 2.0, "outage.from_s": 4.0, "outage.lasts_s": 2.0}
+"""The camera fails 4 s after the UAV passes 3 m."""
+
+
+@pytest.mark.parametrize(("within_s", "reason"), [(0.03, "edge"), (0.7, "")])
+def test_failure_at_the_exact_second_of_an_event_is_an_edge_case(
+    within_s: float, reason: str
+) -> None:
+    def fails(scenario: Scenario, npcs: str) -> bool:
+        follows = scenario["outage.after"] == 2.0 and scenario["outage.lasts_s"] > 1
+        return follows and abs(scenario["outage.from_s"] - 4.0) <= within_s
+
+    fly = FakeFlights(fails, signature=LATE)
+    found = VIOLATING_SCENARIO.replace(OUTAGE)
+    result = CaseBuilder(make_case_request(30, found, signature=LATE), fly).build()
+    assert result.case is not None
+    assert result.case.scenario["outage.after"] == 2.0
+    assert result.case.reason == reason
+    assert (result.case.evidence.neighbours_failed == NEIGHBOURS) == (not reason)
+
+
 def test_failure_with_everything_nominal_keeps_no_condition() -> None:
     result = late_case(lambda _: True, budget=20)
     assert result.case is not None

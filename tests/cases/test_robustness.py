@@ -41,3 +41,14 @@ def test_neighbours_keep_choices_and_move_times_a_little() -> None:
             assert each[f"person-1.{name}"] == told[f"person-1.{name}"]
         # A bird flies half a metre in that time.
         assert 0 < abs(each["person-1.delay_s"] - 8.0) <= 0.041
+
+
+def test_neighbours_move_the_begin_of_an_event_and_keep_its_moment() -> None:
+    outage = {"outage.after": 2.0, "outage.from_s": 4.0, "outage.lasts_s": 2.0}
+    found = neighbours(SCENARIO.replace(outage), LAWN)
+    assert {each["outage.after"] for each in found} == {2.0}
+    moved_s = [abs(each["outage.from_s"] - 4.0) for each in found]
+    assert 0.1 < max(moved_s) <= 0.6, "about a decision of the director"
+    assert min(moved_s) > 0
+    at_once = neighbours(SCENARIO.replace(outage | {"outage.from_s": 0.0}), LAWN)
+    assert all(0 <= each["outage.from_s"] <= 0.6 for each in at_once)
