@@ -9,7 +9,7 @@ and for ``exploring``, which knows no moments.
 `exploring`
     The draws of commit :data:`BEFORE_MOMENTS`, without children and without a model: the strongest
     rival of the search before events and stories could wait for moments.  A work tree of that
-    commit flies it (``lab/frozen.py``).
+    commit flies it (``lab/judges/frozen.py``).
 `exploring+`
     Stratified scenarios with moments and the same director as `garl`; no children, no model.
 `garl`
@@ -35,7 +35,7 @@ from dataclasses import dataclass
 
 from pytest_garl.errors import GarlError
 from pytest_garl.npcs.directed import TIME_TO_GO
-from pytest_garl.npcs.director import FEATURES, WAITING
+from pytest_garl.npcs.director import FEATURES, RULE, WAITING
 from pytest_garl.npcs.domain_policy import GRADED
 from pytest_garl.npcs.gradient import untrained
 from pytest_garl.npcs.policy_catalogue import policy_spec
@@ -52,8 +52,6 @@ from pytest_garl.simulation.npc_policy import PolicySpec
 DOMAIN = domain_named("field")
 BEFORE_MOMENTS = "d16e6dc"
 """The commit before events and stories could wait for moments."""
-MARGIN_S = 1.0
-"""Of the arm `rule`: the best one on a development seed (``python -m lab.judges margin``)."""
 SEED = 5100
 """Of the untrained network."""
 
@@ -63,7 +61,7 @@ def decided_by(decider: str) -> PolicySpec:
     kind, _, margin = decider.partition("@")
     director = ""
     if kind == "rule":
-        director = f"{TIME_TO_GO} {float(margin or MARGIN_S):g} 0"
+        director = f"{TIME_TO_GO} {float(margin or RULE.margin_s):g} {RULE.unseen_s:g}"
     elif kind == "untrained":
         director = untrained(WAITING, (len(FEATURES), 24, 24, 2), SEED).text
     return policy_spec(GRADED).directed_by(director)

@@ -195,6 +195,12 @@ class Valued(Protocol):
         """Return the value of each action, (2,)."""
 
 
+RULE = TimeToGo(margin_s=1.0)
+"""The rule that a director must beat, in the summary and for the judges: an NPC is there a second
+before the UAV.  With this margin most of them met the UAV after it had seen them, in recorded
+flights of three landing systems (``python -m lab.judges margin``)."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LearnedDirector:
     """Goes if the network's second value, that of go, is above the first one, that of wait."""

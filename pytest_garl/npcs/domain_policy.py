@@ -13,6 +13,8 @@ from pytest_garl.scenarios.story import GRADES
 
 GRADED = "graded"
 """The policy of scenarios in which each NPC has a grade of its own."""
+READ_STORIES = (GRADED, *GRADES[:-1])
+"""The policies whose NPCs begin as their stories say.  A hostile NPC attacks from the start."""
 NOBODY = "stationary"
 """The policy of scenarios without NPCs, which has nobody to move."""
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from pytest_garl.flight.flight import Flight
 from pytest_garl.npcs.director import LearnedDirector
-from pytest_garl.npcs.director_progress import EventProgress, Outcome
+from pytest_garl.npcs.director_progress import AND_EVENTS, EventProgress, Outcome
 from pytest_garl.npcs.event_watch import (
     AT,
     EVENT_FEATURES,
@@ -36,7 +36,7 @@ from pytest_garl.npcs.event_watch import (
     inputs,
 )
 from pytest_garl.npcs.gradient import Stopping, StoppingRate, learned_when_to_go
-from pytest_garl.npcs.learned import Array, Network
+from pytest_garl.npcs.learned import Array, Network, network_from
 from pytest_garl.npcs.own_director import mean, mean_worth
 from pytest_garl.scenarios.groups import EVENTS
 from pytest_garl.scenarios.scenario import Scenario
@@ -87,6 +87,16 @@ def rule_network() -> Network:
         strike[first + AT["passed_3_m"]] = 2 * SURE
     weight = np.stack([np.zeros(EVENT_INPUTS), strike])
     return Network(state=STRIKING, layers=((weight, np.zeros(2)),))
+
+
+def learned_kinds(director: str) -> frozenset[str]:
+    """Return the kinds of events that strike as learned by a search's weights; others as ruled."""
+    weights = director.partition(AND_EVENTS)[2]
+    if not weights:
+        return frozenset()
+    found, rule = (each.layers[0][0] for each in (network_from(weights, STRIKING), rule_network()))
+    own = np.flatnonzero((found != rule).any(axis=0)) // len(EVENT_FEATURES)
+    return frozenset(EVENTS[number] for number in own)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

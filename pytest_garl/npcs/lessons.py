@@ -37,10 +37,10 @@ from pytest_garl.scenarios.story import story_of
 from pytest_garl.simulation.landing_moments import HEIGHTS_M, RecordedMoments
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S
 
-RULE = TimeToGo(margin_s=0.5, unseen_s=1.0)
-"""The rule to which a director is compared, with constants tuned in the surrogate."""
+AROUND = TimeToGo(margin_s=0.5, unseen_s=1.0)
+"""The begin in whose neighbourhood most NPCs can meet the UAV."""
 ASKED = (-8, -4, -1, 2, 5)
-"""The decisions of a flight that are asked about, from that of the rule on, in half seconds; those
+"""The decisions of a flight that are asked about, from :data:`AROUND` on, in half seconds; those
 between them are worth what lies between, and those outside nothing."""
 SINKS_MPS = 0.5
 """How fast a UAV sinks of which nothing is known."""
@@ -237,8 +237,8 @@ def _undisturbed(flight: Flight, until_s: float, goes_on: bool, sinks_mps: float
 
 
 def _asked(states: Array) -> tuple[int, ...]:
-    """Return the decisions that are asked about: around that of the rule, in which most meet."""
-    goes = (number for number, row in enumerate(states) if RULE.decides(row))
-    rule = next(goes, len(states) - 1)
+    """Return the decisions that are asked about."""
     last = len(states) - 1
-    return tuple(sorted({min(last, max(0, rule + offset)) for offset in ASKED}))
+    goes = (number for number, row in enumerate(states) if AROUND.decides(row))
+    middle = next(goes, last)
+    return tuple(sorted({min(last, max(0, middle + offset)) for offset in ASKED}))

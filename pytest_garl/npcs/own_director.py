@@ -12,11 +12,11 @@ import numpy as np
 
 from pytest_garl.airframe import Airframe
 from pytest_garl.flight.flight import Flight
-from pytest_garl.npcs.director import Director, LearnedDirector
+from pytest_garl.npcs.director import RULE, Director, LearnedDirector
 from pytest_garl.npcs.director_progress import DirectorProgress
 from pytest_garl.npcs.gradient import Stopping, StoppingRate, learned_when_to_go
 from pytest_garl.npcs.learned import Network, learned_director
-from pytest_garl.npcs.lessons import RULE, SINKS_MPS, Lesson, Response, lessons_of, sinking_mps
+from pytest_garl.npcs.lessons import SINKS_MPS, Lesson, Response, lessons_of, sinking_mps
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 

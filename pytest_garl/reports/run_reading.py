@@ -19,7 +19,8 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import Origin
 from pytest_garl.execution.severity import Severity
 from pytest_garl.execution.stored_ledger import checked_ledger
-from pytest_garl.npcs.director_progress import AND_EVENTS, total, total_of_events
+from pytest_garl.npcs.director_progress import total, total_of_events
+from pytest_garl.npcs.event_lessons import learned_kinds
 from pytest_garl.reports.control_arm import control_arm, is_control
 from pytest_garl.reports.run_record import (
     KindRecord,
@@ -142,7 +143,7 @@ def _search(
     compares = control is not None and control.later.flights > 0
     generations = sorted({(each.id.search, each.id.slot.generation) for each in flights})
     progress = [found for each in generations if (found := facts.progress(*each))]
-    taught = {each for each in generations if AND_EVENTS in facts.director(*each)}
+    learned = {each: learned_kinds(facts.director(*each)) for each in generations}
     return SearchRecord(
         key=key,
         name=name,
@@ -159,7 +160,7 @@ def _search(
         movers=mover_record((flight, jobs[flight.id.search].npcs) for flight in flights),
         director=total(each.npcs for each in progress),
         strikes=strike_record(
-            (flight, (flight.id.search, flight.id.slot.generation) in taught) for flight in flights
+            (flight, learned[flight.id.search, flight.id.slot.generation]) for flight in flights
         ),
         event_director=total_of_events(each.events for each in progress),
         camera=facts.camera(key.system),

@@ -224,7 +224,8 @@ def director_text(search: SearchRecord) -> str:
         f"what begins of {director.npcs} NPCs were worth, where 1 is a collision that the system "
         f"could have prevented: {director.learned:.2f} as the director decides that learns from "
         f"earlier flights, {director.shipped:.2f} with the weights that ship, {director.rule:.2f} "
-        f"by the fixed rule, {director.best:.2f} at best{seen if director.seen else ''}"
+        f"by the fixed rule (there 1 s before the UAV), {director.best:.2f} at best"
+        f"{seen if director.seen else ''}"
     )
 
 

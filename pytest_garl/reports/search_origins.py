@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import How, Origin
-from pytest_garl.npcs.domain_policy import GRADED
+from pytest_garl.npcs.domain_policy import READ_STORIES
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.groups import EVENTS
 from pytest_garl.scenarios.scenario import Scenario
@@ -29,8 +29,6 @@ Mover = Literal["director", "rule", "gene", "policy"]
 time; the moment and the delay of its story; or a policy that reads no story and moves it from the
 start."""
 MOVERS: tuple[Mover, ...] = ("director", "rule", "gene", "policy")
-READ_STORIES = (GRADED, *GRADES[:-1])
-"""The policies whose NPCs begin as their stories say.  A hostile NPC attacks from the start."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,8 +83,9 @@ class MoverRecord:
 class StrikeRecord:
     """Who says when the events of a search strike: numbers of events.
 
-    ``director`` is the one that learned from the flights, ``rule`` the fixed rule in its place, and
-    ``gene`` a moment and a delay of the scenario.
+    ``director`` is the one that learned from the flights, ``rule`` the fixed rule, which decides
+    for a kind of event until something else is learned, and ``gene`` a moment and a delay of the
+    scenario.
     """
 
     director: int
@@ -94,17 +93,20 @@ class StrikeRecord:
     gene: int
 
 
-def strike_record(flown: Iterable[tuple[LedgerFlight, bool]]) -> StrikeRecord | None:
+def strike_record(
+    flown: Iterable[tuple[LedgerFlight, Collection[str]]],
+) -> StrikeRecord | None:
     """Return who let events strike; None if no flight has an event.
 
-    Of each flight is said whether learned weights decide in it.
+    With each flight come the kinds of events for which learned weights decide in it.
     """
     counts: Counter[str] = Counter()
-    for flight, has_learned in flown:
+    for flight, learned in flown:
         scenario = parse_scenario(flight.scenario)
         acting = {key.partition(".")[0] for key, _ in scenario.genes} & {*EVENTS}
         decided = acting & {*scenario.decided_events}
-        counts["director" if has_learned else "rule"] += len(decided)
+        counts["director"] += len(decided & {*learned})
+        counts["rule"] += len(decided - {*learned})
         counts["gene"] += len(acting) - len(decided)
     if not counts.total():
         return None

@@ -17,6 +17,7 @@ from pytest_garl.npcs.event_lessons import (
     EventLesson,
     EventResponse,
     OwnEventDirector,
+    learned_kinds,
     lesson_of,
     rule_network,
 )
@@ -124,6 +125,17 @@ def test_a_director_learns_in_which_state_an_event_hurts() -> None:
     again.learn_lessons(generation)
     again.learn_lessons(generation)
     assert again.text == own.text != ""
+
+
+def test_weights_tell_the_kinds_of_events_that_strike_as_learned() -> None:
+    rule = rule_network()
+    (weight, bias) = rule.layers[0]
+    changed = weight.copy()
+    changed[1] += inputs(np.eye(len(EVENT_FEATURES))[:1], "cover")[0]
+    learned = dataclasses.replace(rule, layers=((changed, bias),))
+    assert learned_kinds("") == learned_kinds("time-to-go 0 0") == frozenset()
+    assert learned_kinds(f"{AND_EVENTS}{rule.text}") == frozenset()
+    assert learned_kinds(f"time-to-go 0 0{AND_EVENTS}{learned.text}") == {"cover"}
 
 
 def test_a_flight_without_events_teaches_nothing_of_what_follows_strikes() -> None:

@@ -11,6 +11,7 @@ from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import Origin
+from pytest_garl.npcs.director import RULE
 from pytest_garl.npcs.director_progress import (
     DirectorProgress,
     EventProgress,
@@ -201,8 +202,8 @@ def test_the_summary_says_how_good_the_director_was_in_all_generations() -> None
     assert director_text(told) == (
         "what begins of 20 NPCs were worth, where 1 is a collision that the system could have "
         "prevented: 0.25 as the director decides that learns from earlier flights, 0.10 with the "
-        "weights that ship, 0.05 by the fixed rule, 0.50 at best; of 3 seen coming it expected "
-        "1.5 to meet the UAV, and 2 did"
+        f"weights that ship, 0.05 by the fixed rule (there {RULE.margin_s:g} s before the UAV), "
+        "0.50 at best; of 3 seen coming it expected 1.5 to meet the UAV, and 2 did"
     )
 
 
@@ -216,19 +217,20 @@ def test_events_are_told_by_who_says_when_they_strike() -> None:
     key = SearchKey(system="my_landing:Mine", map="lawn")
     search = SearchRecord(key=key, name=key.place, flights=(), kinds=(), violating=0)
     flown = [
-        (with_event("decided"), False),
-        (with_event("decided"), True),
-        (with_event("decided", "outage"), True),
-        (with_event("3 m"), True),
-        (with_event("start", "burst"), False),
-        (STORIES[0], True),
+        (with_event("decided"), ()),
+        (with_event("decided"), ("cover",)),
+        (with_event("decided"), ("jump", "outage")),
+        (with_event("decided", "outage"), ("jump", "outage")),
+        (with_event("3 m"), ("cover",)),
+        (with_event("start", "burst"), ()),
+        (STORIES[0], ("cover",)),
     ]
     found = strike_record(flown)
-    assert found == StrikeRecord(director=2, rule=1, gene=2)
-    assert strike_record(flown[5:]) is None
+    assert found == StrikeRecord(director=2, rule=2, gene=2)
+    assert strike_record(flown[6:]) is None
     assert strikes_text(search) == ""
     assert strikes_text(dataclasses.replace(search, strikes=found)) == (
-        "who said when events strike: the learned director for 2, the rule (at 3 m) for 1, their "
+        "who said when events strike: the learned director for 2, the rule (at 3 m) for 2, their "
         "genes for 2"
     )
 
