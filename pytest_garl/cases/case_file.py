@@ -402,7 +402,9 @@ def _is_change(row: object) -> bool:
 MOST_OBJECTS = 1000
 FASTEST_MPS = 1000.0
 """More is no object of a map, and no speed of a body."""
-_OF_BODY = {"grade", "type", "objects", "interference_s", "speed_mps", "window_s", "untried"}
+_OF_BODY = {"grade", "type", "objects", "interference_s", "speed_mps", "when", "window_s"} | {
+    "untried"
+}
 _OF_CONDITIONS = {"conditions", "values", "largest", "largest_share", "unread", "untried"}
 _OF_SHRUNK = {
     "body": "# The adversary that it takes; the weaker, the worse.",
@@ -426,6 +428,7 @@ def severity_lines(severity: Severity, *, is_shrunk: bool) -> list[list[str]]:
                 f"objects = {severity.objects}",
                 f"interference_s = {severity.interference_s!r}",
                 f"speed_mps = {severity.speed_mps!r}",
+                *([f"when = {quoted(severity.when)}"] if severity.when else []),
                 *([] if window_s is None else [f"window_s = {window_s!r}  # of its entry"]),
                 *untried,
             ]
@@ -487,6 +490,7 @@ def read_severity(top: Table) -> Severity:
         objects=table.integer("objects", high=MOST_OBJECTS),
         interference_s=table.number("interference_s", low=0.0, high=LONGEST_S),
         speed_mps=table.number("speed_mps", low=0.0, high=FASTEST_MPS),
+        when=table.string("when") if "when" in table.values else "",
         window_s=table.number("window_s", low=0.0, high=LONGEST_S)
         if "window_s" in table.values
         else None,

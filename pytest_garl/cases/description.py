@@ -77,7 +77,8 @@ def _approach(flight: Flight, hit: ObjectRecord, severity: Severity) -> str:
     point = compass_point(float(side[0]), float(side[1]))
     told = f"{kind} at {speed:.1f} m/s"
     if severity.about == "body":
-        told = _sentence(severity.unusual) + ("," if severity.objects > 1 else "")
+        told = _sentence(severity.unusual)
+        told += "," if severity.objects > 1 or severity.when else ""
     return (
         f"{told} enters from the {point} while the UAV is {up:.1f} m above "
         f"{_ground_below(flight, uav[entered])}."

@@ -258,6 +258,7 @@ def _severity() -> Schema:
             "objects": _whole("how many"),
             "interference_s": _number("for how long it interferes", low=0),
             "speed_mps": _number("how fast it is", low=0),
+            "when": _text("whether it comes while the marker is covered"),
             "window_s": _number("of its entry", low=0),
             **untried,
         },

@@ -29,7 +29,8 @@ class Severity:
 
     Of a body: ``grade`` says how much it knew of the UAV, empty if nobody knows; ``type`` is
     person, child, dog or bird; ``objects`` are in the scenario; it interfered for
-    ``interference_s`` up to the contact; ``speed_mps`` is its highest speed in the last 3 s.  Its
+    ``interference_s`` up to the contact; ``speed_mps`` is its highest speed in the last 3 s;
+    ``when`` says that it came while something covered the marker, and is empty if nothing did.  Its
     entry may be shifted within ``window_s`` and the UAV still hits such a body; None if that was
     not measured.
 
@@ -49,6 +50,7 @@ class Severity:
     objects: int = 0
     interference_s: float = 0.0
     speed_mps: float = 0.0
+    when: str = ""
     window_s: float | None = None
     conditions: tuple[str, ...] = ()
     values: tuple[str, ...] = ()
@@ -140,6 +142,8 @@ class Severity:
         text = f"{article} {words} at {self.speed_mps:.1f} m/s"
         if self.interference_s > 0:
             text += f" for {self.interference_s:.1f} s"
+        if self.when:
+            text += f", which comes {self.when}"
         others = self.objects - 1
         if others < 1:
             return text
@@ -169,6 +173,7 @@ class Severity:
             "objects": self.objects,
             "interference_s": self.interference_s,
             "speed_mps": self.speed_mps,
+            "when": self.when,
             "window_s": self.window_s,
         }
         conditions = {

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.flight.flight import Contact, Flight, ObjectRecord
+from pytest_garl.npcs.domain_policy import READ_STORIES
 from pytest_garl.npcs.grades import GRADE_LIMITS
-from pytest_garl.scenarios.conditions import active_conditions, unread_groups
+from pytest_garl.scenarios.conditions import ActiveCondition, active_conditions, unread_groups
+from pytest_garl.scenarios.groups import COVER, EVENTS
 from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.quantities import significant
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import LIMITS_S, Story, story_of
+from pytest_garl.simulation.events import Beginning, Event
 from pytest_garl.simulation.landing_moments import RecordedMoments
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Verdict
 
 RECENT_S = 3.0
 """The speed of a body is its highest within this time before the contact."""
+DID_NOT_STRIKE = "did not strike"
+"""Said of an event for whose moment the flight was too short."""
 CENTIMETRES = 2
 """Digits of lengths of time and of speeds."""
 
@@ -36,14 +44,17 @@ def severity_of(
     present = tuple(name for name, _ in map.without(scenario.removed_objects).present_objects)
     if verdict.violation_type == "IV" and flight.contacts:
         return _of_body(flight, flight.contacts[-1], scenario, len(present), npcs)
-    conditions = active_conditions(scenario)
+    conditions = [_at_its_moment(each, flight, scenario) for each in active_conditions(scenario)]
     unread = unread_groups(scenario, flight.data_read)
     acting = [each for each in conditions if each.cause not in unread]
     strongest = max(acting, key=lambda each: each.share, default=None)
     return Severity(
         about="conditions",
         conditions=(*(each.cause for each in conditions), *present),
-        values=(*(each.named for each in conditions), *("" for _ in present)),
+        values=(
+            *(each.named for each in conditions),
+            *(_comes(flight, scenario, name, npcs) for name in present),
+        ),
         largest=strongest.words if strongest else "",
         # Of all conditions, so that what a system reads does not change which scenarios are bred.
         largest_share=max((each.share for each in conditions), default=0.0),
@@ -65,7 +76,49 @@ def _of_body(
         objects=objects,
         interference_s=_interference_s(flight, contact, hit, grade, story),
         speed_mps=_speed_mps(hit, contact.time_s) if hit else 0.0,
+        when=_when_it_comes(flight, scenario, contact.body, npcs),
     )
+
+
+def _at_its_moment(
+    condition: ActiveCondition, flight: Flight, scenario: Scenario
+) -> ActiveCondition:
+    """Return a condition that says of an event when it struck, and what covered the marker then."""
+    name = condition.cause
+    if name not in EVENTS:
+        return condition
+    begins_s = Beginning(scenario, name, RecordedMoments(flight)).time_s
+    if begins_s >= flight.elapsed_s:
+        return dataclasses.replace(condition, when=DID_NOT_STRIKE)
+    covered = _while_covered(flight, scenario, begins_s) if name != COVER.name else ""
+    return dataclasses.replace(condition, when=", ".join(filter(None, (condition.when, covered))))
+
+
+def _while_covered(flight: Flight, scenario: Scenario, time_s: float) -> str:
+    """Return ``while the marker is covered`` if something covers it at a time of the flight."""
+    share = scenario["cover.share_percent"]
+    cover = Event(scenario, COVER.name, RecordedMoments(flight))
+    if not share or time_s >= flight.elapsed_s or not cover.happens(time_s):
+        return ""
+    part = "" if share == 100 else f"{significant(share, 2):g} % of "
+    return f"while {part}the marker is covered"
+
+
+def _comes(flight: Flight, scenario: Scenario, name: str, npcs: PolicySpec) -> str:
+    when = _when_it_comes(flight, scenario, name, npcs)
+    return f"comes {when}" if when else ""
+
+
+def _when_it_comes(flight: Flight, scenario: Scenario, name: str, npcs: PolicySpec) -> str:
+    """Return ``while the marker is covered`` if a body comes then; empty for one without a story.
+
+    A policy that reads no stories moves it as it likes.
+    """
+    story = story_of(scenario, name)
+    if story is None or npcs.name not in READ_STORIES or story.grade == "hostile":
+        return ""
+    begins_s = story.begins_s(RecordedMoments(flight).of_npc(name))
+    return _while_covered(flight, scenario, begins_s)
 
 
 def _speed_mps(hit: ObjectRecord, until_s: float) -> float:

@@ -182,6 +182,7 @@ def test_a_file_says_whether_its_severity_is_what_it_takes() -> None:
     "severity",
     [
         BODY,
+        dataclasses.replace(BODY, when="while the marker is covered"),
         dataclasses.replace(BODY, grade="", window_s=None, untried=("dog-1", "fog")),
         CONDITIONS,
         Severity(about="conditions"),

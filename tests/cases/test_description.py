@@ -38,6 +38,23 @@ def test_description_of_a_collision_begins_with_the_adversary() -> None:
     assert stands.startswith("A careless person stands still in the UAV's way")
 
 
+def test_description_of_a_collision_says_that_the_marker_was_covered() -> None:
+    verdict = flight_result("IV:person:descent:seen", story="Collided.").verdict
+    alone = Severity(
+        about="body",
+        grade="careless",
+        type="person",
+        objects=1,
+        speed_mps=1.4,
+        when="while the marker is covered",
+    )
+    told = describe(hits_a_person(), verdict, alone)
+    assert told.startswith(
+        "A careless person at 1.4 m/s, which comes while the marker is covered, enters from the "
+        "west while the UAV is "
+    )
+
+
 def test_description_of_another_violation_begins_with_its_conditions() -> None:
     verdict = flight_result("II:lost", violation_type="II", story="Gave up.").verdict
     fog = Severity(about="conditions", conditions=("fog",), values=("visibility 11 m",))

@@ -147,6 +147,14 @@ def test_data_that_was_never_read_is_no_condition() -> None:
     assert blind.key == LIGHT_AND_DEPTH.key
 
 
+def test_a_body_that_comes_while_the_marker_is_covered_says_so() -> None:
+    hidden = dataclasses.replace(DOG, when="while 40 % of the marker is covered")
+    words = "which comes while 40 % of the marker is covered, 2 others there"
+    assert hidden.text == hidden.unusual == f"a chasing dog at 6.1 m/s for 3.5 s, {words}"
+    assert hidden.key == DOG.key, "it is no worse for that"
+    assert hidden.to_json(took=True)["when"] == hidden.when
+
+
 def test_what_shrinking_did_not_try_is_named() -> None:
     one = dataclasses.replace(LIGHT_AND_DEPTH, untried=("depth",))
     assert one.text == (

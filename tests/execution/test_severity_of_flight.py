@@ -15,8 +15,11 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, with_all_values
+from pytest_garl.simulation.landing_moments import RecordedMoments
 from pytest_garl.verdicts.verdict import Verdict
+from tests.simulation.test_strikes import TELLS, Told, flown, waiting
 from tests.support.collisions import CONTACT_S, TIMES, hits_a_person
+from tests.support.flights import EMPTY
 from tests.support.results import flight_result
 
 LAWN = load_map("lawn")
@@ -114,9 +117,77 @@ def test_object_that_is_not_recorded_has_its_grade_and_type() -> None:
     assert found.text == "a careless person at 0.0 m/s"
 
 
+COVER = {"cover.from_s": 10.0, "cover.lasts_s": 3.0, "cover.share_percent": 100.0}
+"""Something lies over the marker from 10 to 13 s."""
+
+
+@pytest.mark.parametrize(
+    ("comes_s", "cover", "words"),
+    [
+        (9.9, COVER, ""),
+        (10.0, COVER, "while the marker is covered"),
+        (12.9, COVER | {"cover.share_percent": 40.0}, "while 40 % of the marker is covered"),
+        (12.9, COVER | {"cover.share_percent": 0.0}, ""),
+        (13.0, COVER, ""),
+        (12.0, COVER | {"cover.after": 2.0}, ""),
+        (12.0, {}, ""),
+    ],
+)
+def test_body_that_comes_while_the_marker_is_covered_says_so(
+    comes_s: float, cover: dict[str, float], words: str
+) -> None:
+    told = with_story(ALONE, grade="chasing", lasts_s=5.0, delay_s=comes_s).replace(cover)
+    assert severity(told).when == words
+    assert severity(told, "chasing").when == words
+    assert severity(told, "waypoint").when == "", "it does not follow the story"
+    lost = flight_result("II:lost", outcome="gave_up", primary="time", violation_type="II").verdict
+    beside = severity(told, verdict=lost)
+    assert dict(zip(beside.conditions, beside.values, strict=True))["person-1"] == (
+        f"comes {words}" if words else ""
+    )
+
+
+@pytest.mark.parametrize(
+    ("begins", "words"),
+    [
+        ({"from_s": 12.0}, "while the marker is covered, lasts 2 s"),
+        ({"from_s": 14.0}, "lasts 2 s"),
+        ({"from_s": 29.9}, "lasts 2 s"),
+        ({"from_s": 60.0}, "did not strike, lasts 2 s"),
+        ({"after": 5.0}, "did not strike, lasts 2 s"),
+        ({"after": 0.0, "from_s": 12.9}, "while the marker is covered, lasts 2 s"),
+    ],
+)
+def test_event_that_strikes_while_the_marker_is_covered_says_so(
+    begins: dict[str, float], words: str
+) -> None:
+    lost = flight_result("II:lost", outcome="gave_up", primary="time", violation_type="II").verdict
+    values = {"outage.lasts_s": 2.0} | {f"outage.{key}": each for key, each in begins.items()}
+    found = severity(ALONE.without("person-1").replace(COVER | values), verdict=lost)
+    named = dict(zip(found.conditions, found.values, strict=True))
+    assert named == {"outage": words, "cover": "lasts 3 s, share 100 %"}
+
+
 def test_other_violation_says_its_conditions_and_its_objects() -> None:
     lost = flight_result("II:lost", outcome="gave_up", primary="time", violation_type="II").verdict
     foggy = ALONE.replace({"environment.fog": 0.5})
     assert severity(foggy, verdict=lost).text == "2 conditions: fog (visibility 20 m), person-1"
     alone = severity(foggy.without("person-1"), verdict=lost)
     assert (alone.text, alone.largest_share) == ("fog alone, visibility 20 m", 0.5)
+
+
+@pytest.mark.sim
+def test_marker_is_covered_in_the_pictures_of_a_flight_that_says_so() -> None:
+    Told.at_s = 13.5
+    covered = {"cover.from_s": 12.0, "cover.lasts_s": 3.0, "cover.share_percent": 100.0}
+    scenario = waiting("burst").replace(covered)
+    flight = flown(scenario, TELLS)
+    lost = flight_result("II:lost", outcome="gave_up", primary="time", violation_type="II").verdict
+    found = severity_of(flight, lost, scenario, EMPTY, TELLS)
+    assert found is not None
+    (burst,) = (value for value in found.values if "latency" in value)
+    assert "while the marker is covered" in burst
+    struck_s = RecordedMoments(flight).of_event("burst")[-1]
+    hidden = {each.time_s: each.marker.bits_hidden for each in flight.steps if each.marker}
+    assert min(hidden[t] for t in hidden if 12.2 < t <= struck_s) > 0.4
+    assert max(hidden[t] for t in hidden if t < 12.0) < 0.1
