@@ -140,6 +140,11 @@ class CompanionFlight:
             self._exchange()
         return thrusts
 
+    @property
+    def returns_since_s(self) -> float | None:
+        """Since when the vehicle returns home, as it was told; None if it does not."""
+        return self._autopilot.returns_since_s
+
     def close(self) -> None:
         """End the program."""
         if self._process is not None:

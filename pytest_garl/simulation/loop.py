@@ -160,7 +160,10 @@ class Loop:
         tick = self._ticks
         if self.out_of_time:
             self.recorder.event("time_out", f"not landed after {self._time_limit_s:g} s")
-            return "not_landed"
+            if self._system.returns_since_s is None:
+                return "not_landed"
+            self._tell_of_giving_up()
+            return "gave_up"
         self._ticks += 1
         now = tick / PHYSICS_RATE_HZ
         self.recorder.time_s = now
@@ -285,11 +288,18 @@ class Loop:
         self._pending.append((tick + round(latency_s * PHYSICS_RATE_HZ), command))
 
     def _take(self, command: Command) -> None:
-        if type(command) is not type(self._command) and isinstance(command, Abort | Land):
-            name = "abort_command" if isinstance(command, Abort) else "land_command"
-            self.recorder.event(name, f"the system said {type(command).__name__}()")
+        if type(command) is not type(self._command):
+            if isinstance(command, Abort):
+                self._tell_of_giving_up()
+            elif isinstance(command, Land):
+                self.recorder.event("land_command", "the system said Land()")
         self._command = command
         self._control.remember_yaw(command)
+
+    def _tell_of_giving_up(self) -> None:
+        since_s = self._system.returns_since_s
+        how = "the system said Abort()" if since_s is None else "the vehicle turned back home"
+        self.recorder.event("abort_command", how, since_s)
 
 
 def _after_closing(

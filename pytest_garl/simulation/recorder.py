@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -125,9 +126,10 @@ class Recorder:
         """What the latest picture that the landing system got shows of the marker."""
         return self._steps[-1].marker if self._steps else None
 
-    def event(self, name: str, text: str) -> None:
-        """Record an event."""
-        self._events.append(Event(time_s=self.time_s, name=name, text=text))
+    def event(self, name: str, text: str, time_s: float | None = None) -> None:
+        """Record an event of the present, or of an earlier time that is only now known for one."""
+        event = Event(time_s=self.time_s if time_s is None else time_s, name=name, text=text)
+        bisect.insort(self._events, event, key=lambda each: each.time_s)
 
     def sight(self, frame: Frame, renderer: Renderer, eye: Vector) -> Sight:
         """Return what a frame shows of the marker and of the objects."""

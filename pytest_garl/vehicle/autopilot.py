@@ -152,6 +152,8 @@ class Autopilot:
         self._goal: Vector | None = None
         self._turn: tuple[float, float] = (0.0, 0.0)
         self._return: Callable[[VehicleState], None] | None = None
+        self.returns_since_s: float | None = None
+        """When it was told to return home; None in another mode."""
         self._is_home = False
         self._near_s: float | None = None
         self.told: list[str] = []
@@ -234,7 +236,7 @@ class Autopilot:
         if mode == self.mode:
             return True
         self.mode, self._return, self._turn = mode, None, (0.0, 0.0)
-        self._is_home = False
+        self._is_home, self.returns_since_s = False, None
         if mode == "LAND":
             self._control.land()
         elif mode == "RTL":
@@ -378,7 +380,8 @@ class Autopilot:
     def command(self, told: Diagnostics) -> Command:
         """Return what the vehicle does, for the record: the motors are flown by ``control``.
 
-        To be back over a home where the marker cannot lie is to have given up the landing.
+        A flight in which the vehicle is back over a home where the marker cannot lie is over; it was
+        given up at ``returns_since_s``.
         """
         if self._is_home:
             return Abort(diagnostics=told)
@@ -403,6 +406,7 @@ class Autopilot:
             self._control.land()
             return
         x, y, z = self.now.position_m
+        self.returns_since_s = self.now.time_s
         top = max(z, self.home_m[2] + height_m)
         legs = [(x, y, top), (self.home_m[0], self.home_m[1], top)]
         arrived: list[float] = []

@@ -157,7 +157,7 @@ class Px4Autopilot(Autopilot):
         if mode == self.mode:
             return True
         self.mode, self._return, self._turn = mode, None, (0.0, 0.0)
-        self._is_home = False
+        self._is_home, self.returns_since_s = False, None
         if mode == "AUTO.LAND":
             self._control.land()
         elif mode == "AUTO.PRECLAND":

@@ -15,8 +15,10 @@ from pytest_garl.companion.companion_program import CompanionProgram
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.landing_system import Command, Land, Observation, VehicleState
 from pytest_garl.program import ProgramFailedError
+from pytest_garl.simulation.fly import fly
 from pytest_garl.vehicle.autopilot import ArduCopter
 from tests.companion.processes import CAMERA, board_picture, mission, script
+from tests.support.flights import EMPTY, STAND, nominal
 
 HEADER = """
 import time
@@ -314,3 +316,27 @@ def test_a_landed_vehicle_says_land(tmp_path: Path) -> None:
     text = f"{HEADER}\nlink.set_mode('LAND')\n"
     commands = fly_still(program(tmp_path, text), 3.0, height_m=5.0)
     assert isinstance(commands[-1], Land)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(
+    ("afterwards", "outcome", "said_s"),
+    [("", "gave_up", [3.0]), ('time.sleep(2)\nlink.set_mode("GUIDED")\n', "not_landed", [])],
+)
+def test_a_return_home_that_lasts_to_the_end_was_given_up_when_it_was_commanded(
+    tmp_path: Path, afterwards: str, outcome: str, said_s: list[float]
+) -> None:
+    begins = """
+link.set_mode("GUIDED")
+link.arducopter_arm()
+link.mav.command_long_send(1, 1, mav.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 0, 6)
+while link.recv_match(type="LOCAL_POSITION_NED", blocking=True).time_boot_ms < 3000:
+    pass
+link.set_mode("RTL")
+"""
+    flown = program(tmp_path, f"{HEADER}{begins}{afterwards}time.sleep(99)\n")
+    flight = fly(nominal(), flown, STAND, map=EMPTY, time_limit_s=8.0)
+    assert flight.outcome == outcome
+    events = [each for each in flight.events if each.name == "abort_command"]
+    assert [each.time_s for each in events] == pytest.approx(said_s, abs=0.2)
+    assert [each.time_s for each in flight.events] == sorted(each.time_s for each in flight.events)

@@ -189,7 +189,10 @@ def test_to_be_back_home_is_to_have_given_up_where_no_marker_can_be(
             pilot.set_mode("RTL")
         said.append(type(pilot.command(Diagnostics())))
 
-    flown(orders, 14.0, ArduCopter(parameters={"RTL_ALT": 600}), 4.0, marker_m)
+    _, pilot = flown(orders, 14.0, ArduCopter(parameters={"RTL_ALT": 600}), 4.0, marker_m)
+    assert pilot.returns_since_s == pytest.approx(2.0, abs=0.1)
+    pilot.set_mode("LOITER")
+    assert pilot.returns_since_s is None
     assert said[0] is PositionSetpoint
     assert (Abort in said) == gives_up
 

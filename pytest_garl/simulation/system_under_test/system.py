@@ -21,7 +21,11 @@ from pytest_garl.simulation.system_under_test.calls import (
     read_airframe,
 )
 from pytest_garl.simulation.system_under_test.diagnostics import DiagnosticsQuota
-from pytest_garl.simulation.system_under_test.ground_truth import TruthPilot, truth_pilot_of
+from pytest_garl.simulation.system_under_test.ground_truth import (
+    TruthPilot,
+    is_own,
+    truth_pilot_of,
+)
 from pytest_garl.simulation.system_under_test.validation import read_command, read_thrusts
 
 
@@ -61,6 +65,14 @@ class SystemUnderTest:
             "needs_camera", lambda: bool(getattr(self._system, "needs_camera", True))
         )
         self.truth_pilot = truth_pilot_of(self._system)
+
+    @property
+    def returns_since_s(self) -> float | None:
+        """Since when a vehicle of this package returns home; None if it does not, or is another."""
+        if not is_own(type(self._system)):
+            return None
+        since_s: float | None = getattr(self._system, "returns_since_s", None)
+        return since_s
 
     def step(self, observation: Observation) -> Command:
         """Return the checked command for one camera frame."""
