@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import os
 import selectors
 import signal
 import socket
@@ -22,7 +21,6 @@ from typing import Any
 import cv2
 import numpy as np
 
-from pytest_garl import cpu_dispatch
 from pytest_garl.airframe import Airframe, Camera
 from pytest_garl.distortion import undistorted
 from pytest_garl.foreign_text import cut
@@ -35,8 +33,8 @@ from pytest_garl.landing_system import (
     Observation,
     VehicleState,
 )
-from pytest_garl.process_tree import descendants_of, kill
 from pytest_garl.program import ProgramFailedError, end_in_words
+from pytest_garl.program_process import ProgramProcess
 from pytest_garl.vehicle.autopilot import ArduCopter
 from pytest_garl.vehicle.mavlink import MavlinkLink
 from pytest_garl.vehicle.ned import on_globe
@@ -52,7 +50,6 @@ MOST_MESSAGE = 2**24
 """Bytes of a message from the process: all that it may hold is cut before."""
 TARGET_FOR_S = 1.0
 """So long a landing target that the program told of is what it takes for the marker."""
-SAID_BYTES = 16_384
 QUIET_S: float | None = 1.5
 STACK_S = 0.1
 """After so much wall time a program is asked where it is, and so long it has to say it."""
@@ -250,17 +247,15 @@ class Answer:
     failure: Mapping[str, str] | None
 
 
-class CompanionProcess:
+class CompanionProcess(ProgramProcess):
     """The process of a program; it runs only while ``exchange`` waits for it.
 
     ``ended`` is whether the program has come to its end.
     """
 
     def __init__(self, start: Start, camera: Camera, mission: Mission) -> None:
-        self._name = start.name
         facts = mission_facts(mission, camera)
-        ours, theirs = socket.socketpair()
-        self._link = ours
+        self._link, theirs = socket.socketpair()
         settings = {
             "link": theirs.fileno(),
             "arguments": [_filled(each, facts) for each in start.arguments],
@@ -270,29 +265,18 @@ class CompanionProcess:
             "rate_hz": camera.rate_hz,
         }
         self.ended = self._listens = False
-        self._said = b""
-        try:
-            self._process = subprocess.Popen(
+        with theirs:
+            super().__init__(
+                start.name,
                 [start.python, str(RUNNER), json.dumps(settings)],
-                cwd=start.folder,
-                env={**_environment(), **start.environment},
+                start.folder,
+                {"QT_QPA_PLATFORM": "offscreen", "TZ": "UTC", **start.environment},
                 stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,
-                bufsize=0,
             )
-        except OSError as error:
-            raise self._failure("NotStarted", f"cannot be started: {error.strerror}") from None
-        finally:
-            theirs.close()
-        assert self._process.stdout is not None
-        self._output = self._process.stdout.fileno()
-        os.set_blocking(self._output, False)
-        self._wait = selectors.PollSelector()
-        self._wait.register(self._link, selectors.EVENT_READ)
-        self._wait.register(self._output, selectors.EVENT_READ)
+        self._ready.register(self._link, selectors.EVENT_READ)
 
     def exchange(self, until_s: float, frame: int, data: bytes, picture: Any) -> Answer:
         """Give the program time and bytes; return what it did until it waits for more."""
@@ -323,22 +307,15 @@ class CompanionProcess:
 
     def close(self) -> None:
         """Kill the process, what it has started, and what is left of its group."""
-        self._wait.close()
-        kill(descendants_of(self._process.pid))
-        with contextlib.suppress(OSError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.kill()
-        self._process.wait()
+        super().close()
         self._link.close()
-        assert self._process.stdout is not None
-        self._process.stdout.close()
 
     @contextlib.contextmanager
     def _refusing_garbage(self) -> Any:
         try:
             yield
         except (ValueError, KeyError, TypeError, struct.error) as error:
-            raise self._failure(
+            raise self.failure(
                 "BadMessage",
                 f"wrote into the link between its process and the simulator ({error}); that "
                 "file is not its own",
@@ -361,12 +338,10 @@ class CompanionProcess:
         data = b""
         quiet_s = QUIET_S
         while len(data) < size:
-            ready = {key.fd for key, _ in self._wait.select(quiet_s)}
+            ready = self.ready(quiet_s)
             if not ready and quiet_s is not None:
                 quiet_s = None
                 self._tell_where_it_is()
-            if self._output in ready:
-                self._read_output()
             if self._link.fileno() in ready:
                 try:
                     part = self._link.recv(size - len(data))
@@ -382,46 +357,28 @@ class CompanionProcess:
         if not self._listens:
             return  # It would end by the signal.
         self._process.send_signal(ASKED)
-        self._wait.select(QUIET_S)
+        self.ready(QUIET_S)
         time.sleep(STACK_S)
-        self._read_output()
+        self.read_said()
         place = self._place()
         at = f", at {place}" if place else ""
         sys.stderr.write(f"{self._name} computes without waiting for anything{at}\n")
 
     def _place(self) -> str:
         """Return where the program was, of the last stack of threads in what it wrote."""
-        stack = self._said.decode(errors="replace").rpartition("Current thread")[2]
+        stack = self.said.rpartition("Current thread")[2]
         places = [line.strip() for line in stack.splitlines() if line.startswith("  File")]
         own = [each for each in places if str(RUNNER.parent) not in each]
         return own[0] if own else ""
 
-    def _read_output(self) -> None:
-        """Take what was written past Python's ``sys.stdout``: it may not block the process."""
-        try:
-            data = os.read(self._output, 2**16)
-        except BlockingIOError:
-            return
-        if not data:
-            self._wait.unregister(self._output)
-        self._said = (self._said + data)[-SAID_BYTES:]
-
     def _died(self) -> ProgramFailedError:
         status = self._process.wait()
-        for _ in range(2):
-            with contextlib.suppress(OSError, KeyError):
-                self._read_output()
+        self.read_said()
         error, how = end_in_words(status)
-        said = self._said.decode(errors="replace").strip()
-        end = f"; it said last: {said[-300:]}" if said else ""
+        end = f"; it said last: {self.said[-300:]}" if self.said else ""
         if place := self._place():
             end = f", at {place}"
-        return self._failure(error, f"ended in the flight with {how}{end}", trace=said)
-
-    def _failure(self, error: str, message: str, *, trace: str = "") -> ProgramFailedError:
-        return ProgramFailedError(
-            error, f"{self._name} {message}", where=self._name, trace=trace, kind="died"
-        )
+        return self.failure(error, f"ended in the flight with {how}{end}")
 
 
 def _filled(word: str, facts: Mapping[str, object]) -> str:
@@ -430,21 +387,6 @@ def _filled(word: str, facts: Mapping[str, object]) -> str:
         return word.format(**facts)
     except (KeyError, IndexError, ValueError, AttributeError):
         return word
-
-
-def _environment() -> dict[str, str]:
-    """Return the environment of a program: this process's, with one order of hashes and kernels."""
-    own = {
-        key: value
-        for key, value in os.environ.items()
-        if not key.startswith(("PYTEST_", "COV_CORE_"))
-    }
-    return {
-        **own,
-        **cpu_dispatch.environment_of_programs(),
-        "QT_QPA_PLATFORM": "offscreen",
-        "TZ": "UTC",
-    }
 
 
 def _detection(

@@ -151,7 +151,7 @@ class RunningProgram:
             return read(self._child.ask(line, what))
         except protocol.BadMessageError as error:
             text = f"at {what}: {printable(str(error))}"
-            raise self._child.failure("nonsense", error.error, text) from None
+            raise self._child.failure(error.error, text, "nonsense") from None
 
 
 def _name_of(command: Sequence[str]) -> str:

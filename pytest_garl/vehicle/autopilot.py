@@ -69,22 +69,16 @@ class ArduCopter:
     ``parameters`` are ArduPilot's, by name and in its units (``{"PLND_ENABLED": 1, "LAND_SPEED":
     30}``).  ``pilot`` is the mode into which a human pilot switches: with "LAND" the pilot takes
     off, flies to the told coordinate at the search altitude, waits there and switches, for programs
-    that only help ArduPilot to land; by default the program does all of it.  With
-    ``origin="coordinate"`` local positions begin at the told coordinate, not at the home position.
+    that only help ArduPilot to land; by default the program does all of it.
     """
 
     parameters: Mapping[str, float] = field(default_factory=dict)
     pilot: Pilot = ""
-    origin: Literal["home", "coordinate"] = "home"
 
     def __post_init__(self) -> None:
         if self.pilot not in get_args(Pilot):
             raise LandingSystemError(
                 f"ArduCopter.pilot = {self.pilot!r}: expected 'LAND' or 'LOITER', or '' for none"
-            )
-        if self.origin not in ("home", "coordinate"):
-            raise LandingSystemError(
-                f"ArduCopter.origin = {self.origin!r}: expected 'home' or 'coordinate'"
             )
         check_names(self.parameters)
 
@@ -138,9 +132,7 @@ class Autopilot:
         self._ground_m = FEET_M
         x, y, _ = mission.home_m
         self.home_m: Vector = (x, y, FEET_M)
-        at_coordinate = getattr(vehicle, "origin", "home") == "coordinate"
-        ox, oy = mission.gps_position_m if at_coordinate else (x, y)
-        self.origin_m: Vector = (ox, oy, FEET_M)
+        self.origin_m: Vector = self.home_m
         self.mode = self.air_mode if vehicle.pilot else self.first_mode
         self.armed = False
         self.state: VehicleState | None = None
@@ -380,7 +372,7 @@ class Autopilot:
     def command(self, told: Diagnostics) -> Command:
         """Return what the vehicle does, for the record: the motors are flown by ``control``.
 
-        A flight in which the vehicle is back over a home where the marker cannot lie is over; it was
+        A flight ends when the vehicle is back over a home where the marker cannot lie; it was
         given up at ``returns_since_s``.
         """
         if self._is_home:

@@ -330,7 +330,7 @@ def test_a_return_home_that_lasts_to_the_end_was_given_up_when_it_was_commanded(
 link.set_mode("GUIDED")
 link.arducopter_arm()
 link.mav.command_long_send(1, 1, mav.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 0, 6)
-while link.recv_match(type="LOCAL_POSITION_NED", blocking=True).time_boot_ms < 3000:
+while link.recv_match(type="LOCAL_POSITION_NED", blocking=True).time_boot_ms < 33_000:
     pass
 link.set_mode("RTL")
 """

@@ -274,84 +274,71 @@ class Param(Plugin):
         return int(await self.get_param_float(name))
 
 
+_TELEMETRY: dict[str, tuple[str, Callable[[Any, Any], Any]]] = {
+    "position": (
+        "GLOBAL_POSITION_INT",
+        lambda t, m: t.Position(m.lat / 1e7, m.lon / 1e7, m.alt / 1000, m.relative_alt / 1000),
+    ),
+    "home": (
+        "HOME_POSITION",
+        lambda t, m: t.Position(m.latitude / 1e7, m.longitude / 1e7, m.altitude / 1000, 0.0),
+    ),
+    "heading": ("GLOBAL_POSITION_INT", lambda t, m: t.Heading(m.hdg / 100)),
+    "velocity_ned": ("LOCAL_POSITION_NED", lambda t, m: t.VelocityNed(m.vx, m.vy, m.vz)),
+    "position_velocity_ned": (
+        "LOCAL_POSITION_NED",
+        lambda t, m: t.PositionVelocityNed(
+            t.PositionNed(m.x, m.y, m.z), t.VelocityNed(m.vx, m.vy, m.vz)
+        ),
+    ),
+    "attitude_euler": (
+        "ATTITUDE",
+        lambda t, m: t.EulerAngle(
+            *map(math.degrees, (m.roll, m.pitch, m.yaw)), 1000 * m.time_boot_ms
+        ),
+    ),
+    "distance_sensor": (
+        "DISTANCE_SENSOR",
+        lambda t, m: t.DistanceSensor(
+            *(each / 100 for each in (m.min_distance, m.max_distance, m.current_distance)),
+            t.EulerAngle(0.0, -90.0, 0.0, 0),
+        ),
+    ),
+    "health": ("SYS_STATUS", lambda t, _: t.Health(*[True] * 7)),
+    "health_all_ok": ("SYS_STATUS", lambda *_: True),
+    "armed": ("HEARTBEAT", lambda _, m: bool(m.base_mode & 128)),
+    "in_air": ("EXTENDED_SYS_STATE", lambda _, m: m.landed_state in (2, 3, 4)),
+    "landed_state": ("EXTENDED_SYS_STATE", lambda t, m: t.LandedState(m.landed_state)),
+    "flight_mode": (
+        "HEARTBEAT",
+        lambda t, m: t.FlightMode[_MODES.get(_mode_of(m), "UNKNOWN")],
+    ),
+    "status_text": (
+        "STATUSTEXT",
+        lambda t, m: t.StatusText(t.StatusTextType.INFO, m.text.strip("\0")),
+    ),
+}
+"""What MAVSDK's ``telemetry`` tells: for each call the message, and the value that it becomes."""
+
+
+def _mode_of(beat: Any) -> str:
+    return str(importlib.import_module("pymavlink.mavutil").mode_string_v10(beat))
+
+
 class Telemetry(Plugin):
     """MAVSDK's ``telemetry``."""
 
-    async def _told(self, kind: str, convert: Any) -> AsyncIterator[Any]:
-        module = self._server.module("telemetry")
-        async for message in self._server.messages(kind):
-            yield convert(module, message)
+    def __getattr__(self, name: str) -> Any:
+        if name not in _TELEMETRY:
+            return super().__getattr__(name)
+        kind, convert = _TELEMETRY[name]
 
-    def position(self) -> Any:
-        return self._told(
-            "GLOBAL_POSITION_INT",
-            lambda t, m: t.Position(m.lat / 1e7, m.lon / 1e7, m.alt / 1000, m.relative_alt / 1000),
-        )
+        async def told() -> AsyncIterator[Any]:
+            module = self._server.module("telemetry")
+            async for message in self._server.messages(kind):
+                yield convert(module, message)
 
-    def home(self) -> Any:
-        return self._told(
-            "HOME_POSITION",
-            lambda t, m: t.Position(m.latitude / 1e7, m.longitude / 1e7, m.altitude / 1000, 0.0),
-        )
-
-    def heading(self) -> Any:
-        return self._told("GLOBAL_POSITION_INT", lambda t, m: t.Heading(m.hdg / 100))
-
-    def velocity_ned(self) -> Any:
-        return self._told("LOCAL_POSITION_NED", lambda t, m: t.VelocityNed(m.vx, m.vy, m.vz))
-
-    def position_velocity_ned(self) -> Any:
-        return self._told(
-            "LOCAL_POSITION_NED",
-            lambda t, m: t.PositionVelocityNed(
-                t.PositionNed(m.x, m.y, m.z), t.VelocityNed(m.vx, m.vy, m.vz)
-            ),
-        )
-
-    def attitude_euler(self) -> Any:
-        return self._told(
-            "ATTITUDE",
-            lambda t, m: t.EulerAngle(
-                *map(math.degrees, (m.roll, m.pitch, m.yaw)), 1000 * m.time_boot_ms
-            ),
-        )
-
-    def distance_sensor(self) -> Any:
-        return self._told(
-            "DISTANCE_SENSOR",
-            lambda t, m: t.DistanceSensor(
-                m.min_distance / 100,
-                m.max_distance / 100,
-                m.current_distance / 100,
-                t.EulerAngle(0.0, -90.0, 0.0, 0),
-            ),
-        )
-
-    def health(self) -> Any:
-        return self._told("SYS_STATUS", lambda t, _: t.Health(*[True] * 7))
-
-    def health_all_ok(self) -> Any:
-        return self._told("SYS_STATUS", lambda *_: True)
-
-    def armed(self) -> Any:
-        return self._told("HEARTBEAT", lambda _, m: bool(m.base_mode & 128))
-
-    def in_air(self) -> Any:
-        return self._told("EXTENDED_SYS_STATE", lambda _, m: m.landed_state in (2, 3, 4))
-
-    def landed_state(self) -> Any:
-        return self._told("EXTENDED_SYS_STATE", lambda t, m: t.LandedState(m.landed_state))
-
-    def flight_mode(self) -> Any:
-        return self._told(
-            "HEARTBEAT",
-            lambda t, _: t.FlightMode[_MODES.get(self._server.link.flightmode, "UNKNOWN")],
-        )
-
-    def status_text(self) -> Any:
-        return self._told(
-            "STATUSTEXT", lambda t, m: t.StatusText(t.StatusTextType.INFO, m.text.strip("\0"))
-        )
+        return told
 
 
 def change_mavsdk(module: Any) -> None:

@@ -43,8 +43,8 @@ def python_words(command: Any, options: dict[str, Any]) -> list[str] | None:
     return [python, *words] if runs else None
 
 
-def install(host: Any, header: struct.Struct) -> None:
-    """Let ``subprocess`` start Python programs in the time of this host."""
+def install(host: Any, wire: Any) -> None:
+    """Let ``subprocess`` start Python programs in the time of this host, each over a ``wire``."""
     turns, network, sight = host.turns, host.network, host.sight
     no_asyncio = refusing("starts a Python program by asyncio", "subprocess.Popen")
 
@@ -59,7 +59,8 @@ def install(host: Any, header: struct.Struct) -> None:
                 return
             if sys._getframe(1).f_globals.get("__name__", "").startswith("asyncio"):
                 no_asyncio()
-            self._link, theirs = _real_pair()
+            ours, theirs = _real_pair()
+            self._wire = wire(ours)
             settings = {**host.settings, "link": theirs.fileno(), "arguments": words[1:]}
             kept = {name: options[name] for name in ("cwd", "env") if name in options}
             super().__init__(
@@ -93,20 +94,17 @@ def install(host: Any, header: struct.Struct) -> None:
             super().wait()
             self.returncode = status
             network.mailboxes.remove(self._mail)
-            self._link.close()
+            self._wire.close()
             if self._out is not None:
                 self._out.close()
 
         def _exchange(self) -> int | None:
             data, self._mail[:] = bytes(self._mail), b""
-            self._send(b"G", struct.pack("!dI", turns.now_s, sight.number) + data)
-            while True:
-                kind, size = header.unpack(self._exactly(header.size))
-                answer = self._exactly(size)
-                if kind == b"F":
-                    self._send(b"I", sight.newest().tobytes())
-                elif kind == b"D":
-                    break
+            self._wire.write(b"G", struct.pack("!dI", turns.now_s, sight.number) + data)
+            while (message := self._wire.read())[0] != b"D":
+                if message[0] == b"F":
+                    self._wire.write(b"I", sight.newest().tobytes())
+            answer = bytes(message[1])
             (size,) = struct.unpack_from("!I", answer)
             facts = json.loads(answer[4 : 4 + size])
             network.transmit(answer[4 + size :])
@@ -119,18 +117,6 @@ def install(host: Any, header: struct.Struct) -> None:
             return (
                 (facts["ended"] or int(facts["failure"] is not None)) if "ended" in facts else None
             )
-
-        def _send(self, kind: bytes, data: bytes) -> None:
-            self._link.sendall(header.pack(kind, len(data)) + data)
-
-        def _exactly(self, size: int) -> bytes:
-            data = b""
-            while len(data) < size:
-                part = self._link.recv(size - len(data))
-                if not part:
-                    raise OSError("it has ended")
-                data += part
-            return data
 
         def poll(self) -> Any:
             if self._task is None:

@@ -44,54 +44,71 @@ def load_inside() -> Any:
     return package
 
 
-class Printed(io.TextIOBase):
-    """Standard output and errors of the program: kept in order, of a flood the first part."""
+class Kept(io.RawIOBase):
+    """What the program prints and writes as errors: in order, of a flood the first part."""
 
-    encoding = "utf-8"
-    errors = "replace"
-
-    def __init__(self, number: int) -> None:
-        self._number = number
-        self.buffer: Any = _Bytes(self)
+    def __init__(self) -> None:
         self.texts: list[str] = []
 
-    def write(self, text: str) -> int:
+    def write(self, data: Any) -> int:
         """Keep a text."""
+        written = bytes(data)
         room = MOST_PRINTED - sum(map(len, self.texts))
         if room > 0:
-            self.texts.append(text[:room])
-        return len(text)
+            self.texts.append(written.decode("utf-8", "replace")[:room])
+        return len(written)
 
     def fileno(self) -> int:
         """Return the number of the real stream, for other programs that are started."""
-        return self._number
+        return 1
 
     def writable(self) -> bool:
         """Return that one can write to it."""
         return True
 
 
-class _Bytes(io.RawIOBase):
-    def __init__(self, text: Printed) -> None:
-        self._text = text
+class Wire:
+    """Messages of a type and some bytes over a socket; OSError if the other end is gone."""
 
-    def write(self, data: Any) -> int:
-        return self._text.write(bytes(data).decode("utf-8", "replace"))
+    def __init__(self, link: Any) -> None:
+        self._link = link
 
-    def writable(self) -> bool:
-        return True
+    def write(self, kind: bytes, data: bytes = b"") -> None:
+        """Send a message."""
+        self._link.sendall(HEADER.pack(kind, len(data)) + data)
+
+    def read(self) -> tuple[bytes, bytearray]:
+        """Wait for a message."""
+        kind, size = HEADER.unpack(self._exactly(HEADER.size))
+        return kind, self._exactly(size)
+
+    def _exactly(self, size: int) -> bytearray:
+        data = bytearray(size)
+        view = memoryview(data)
+        while view:
+            count = self._link.recv_into(view)
+            if not count:
+                raise OSError("the other end is gone")
+            view = view[count:]
+        return data
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._link.close()
 
 
 class Host:
     """The simulator's end: asks it for more time, and for frames."""
 
-    def __init__(self, link: socket.socket, settings: dict[str, Any]) -> None:
-        self._link, self.settings = link, settings
-        self._receive, self._send = link.recv_into, link.sendall
+    def __init__(self, wire: Wire, settings: dict[str, Any]) -> None:
+        self._wire, self.settings = wire, settings
         self.turns = sys.modules[f"{NAME}.turns"].Turns(self.exchange)
         self.network = sys.modules[f"{NAME}.network"].Network(self.turns)
         self.sight = sys.modules[f"{NAME}.sight"].Sight(self.turns, self.frame, settings)
-        self.printed = Printed(1)
+        self.kept: Any = Kept()
+        self.printed = io.TextIOWrapper(
+            self.kept, encoding="utf-8", errors="replace", newline="", write_through=True
+        )
         self.links_opened = 0
 
     def exchange(self) -> None:
@@ -119,45 +136,31 @@ class Host:
         """Write what the program did since the exchange before."""
         sent, self.network.outbox = bytes(self.network.outbox), bytearray()
         found, self.sight.found = self.sight.found[:MOST_FOUND], []
-        printed, self.printed.texts = "".join(self.printed.texts), []
+        printed, self.kept.texts = "".join(self.kept.texts), []
         self.links_opened = max(self.links_opened, len(self.network.to_vehicle))
         facts = {"printed": printed, "found": found, "links": self.links_opened, **more}
         text = json.dumps(facts).encode()
-        self._write(b"D", struct.pack("!I", len(text)) + text + sent)
+        self._wire.write(b"D", struct.pack("!I", len(text)) + text + sent)
 
     def wait_for_the_end(self) -> None:
         """Read until the simulator closes the link: what was told last may not be read yet."""
-        self._link.setblocking(True)
-        while self._receive(bytearray(2**16)):
-            continue
-        os._exit(0)
+        while True:
+            self._read()
 
     def frame(self) -> Any:
         """Return the newest frame as an array (H, W, 3), blue first."""
         import numpy as np
 
-        self._write(b"F", b"")
+        self._wire.write(b"F")
         _, data = self._read()
         shape = self.settings["height_px"], self.settings["width_px"], 3
         return np.frombuffer(data, np.uint8).reshape(shape)
 
-    def _write(self, kind: bytes, data: bytes) -> None:
-        self._send(HEADER.pack(kind, len(data)) + data)
-
-    def _read(self) -> Any:
-        kind, size = HEADER.unpack(self._exactly(HEADER.size))
-        return kind, self._exactly(size)
-
-    def _exactly(self, size: int) -> bytearray:
-        data = bytearray(size)
-        view = memoryview(data)
-        got = 0
-        while got < size:
-            count = self._receive(view[got:])
-            if not count:
-                os._exit(0)  # The simulator is gone.
-            got += count
-        return data
+    def _read(self) -> tuple[bytes, bytearray]:
+        try:
+            return self._wire.read()
+        except OSError:
+            os._exit(0)  # The simulator is gone.
 
 
 class Hooks:
@@ -196,7 +199,7 @@ def install(host: Host) -> None:
     turns, network, sight = (sys.modules[f"{NAME}.{each}"] for each in parts)
     turns.install(host.turns)
     network.install(host.network)
-    sys.modules[f"{NAME}.offspring"].install(host, HEADER)
+    sys.modules[f"{NAME}.offspring"].install(host, Wire)
     tags = {
         name: lambda module: sight.change_apriltag(module, host.sight)
         for name in ("apriltag", "dt_apriltags", "pupil_apriltags", "pyapriltags")
@@ -302,13 +305,13 @@ def main() -> None:
     faulthandler.register(ASKED, 2)
     signal.siginterrupt(ASKED, False)
     settings = json.loads(sys.argv[1])
-    link = socket.socket(fileno=settings["link"])
-    link.sendall(HEADER.pack(b"R", 0))
+    wire = Wire(socket.socket(fileno=settings["link"]))
+    wire.write(b"R")
     _end_with_parent()
     _limit_memory()
     sys.path[:] = [each for each in sys.path if Path(each or ".").resolve() != HERE]
     load_inside()
-    host = Host(link, settings)
+    host = Host(wire, settings)
     install(host)
     status: Any = 0
     failure: dict[str, Any] | None = None
