@@ -44,8 +44,10 @@ def load_inside() -> Any:
     return package
 
 
-class Kept(io.RawIOBase):
+class Kept(io.BufferedIOBase):
     """What the program prints and writes as errors: in order, of a flood the first part."""
+
+    name = "<stdout>"
 
     def __init__(self) -> None:
         self.texts: list[str] = []
@@ -105,7 +107,7 @@ class Host:
         self.turns = sys.modules[f"{NAME}.turns"].Turns(self.exchange)
         self.network = sys.modules[f"{NAME}.network"].Network(self.turns)
         self.sight = sys.modules[f"{NAME}.sight"].Sight(self.turns, self.frame, settings)
-        self.kept: Any = Kept()
+        self.kept = Kept()
         self.printed = io.TextIOWrapper(
             self.kept, encoding="utf-8", errors="replace", newline="", write_through=True
         )
