@@ -8,6 +8,7 @@ from typing import Any
 from pytest_garl.execution.result import How
 from pytest_garl.files.run_files import RUN_FOLDER
 from pytest_garl.messages import command
+from pytest_garl.npcs.director_progress import DirectorProgress, EventProgress
 from pytest_garl.reports.control_arm import LEAST_FLIGHTS, ControlArm
 from pytest_garl.reports.run_record import WHY_NO_LANDING, KindRecord, RunRecord, SearchRecord
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
@@ -221,11 +222,20 @@ def director_text(search: SearchRecord) -> str:
         f"and {director.met} did"
     )
     return (
-        f"what begins of {director.npcs} NPCs were worth, where 1 is a collision that the system "
-        f"could have prevented: {director.learned:.2f} as the director decides that learns from "
-        f"earlier flights, {director.shipped:.2f} with the weights that ship, {director.rule:.2f} "
-        f"by the fixed rule (there 1 s before the UAV), {director.best:.2f} at best"
-        f"{seen if director.seen else ''}"
+        f"what the begins of {director.npcs} NPCs are worth, in preventable collisions per 100: "
+        f"{_above(director)} (there 1 s before the UAV); {100 * director.shipped:.1f} with the "
+        f"weights that ship, {100 * director.best:.1f} at best{seen if director.seen else ''}"
+    )
+
+
+def _above(progress: DirectorProgress | EventProgress) -> str:
+    """Return what the learned director is worth, and how far that lies above the rule."""
+    learned = round(100 * progress.learned, 1)
+    more = round(learned - round(100 * progress.rule, 1), 1)
+    than = f"{abs(more):.1f} {'more' if more > 0 else 'less'} than" if more else "as much as"
+    return (
+        f"{learned:.1f} as the director decides that learns from earlier flights, {than} by the "
+        "fixed rule"
     )
 
 
@@ -260,11 +270,9 @@ def event_director_text(search: SearchRecord) -> str:
     if found is None or found.struck < TELLING_NPCS:
         return ""
     return (
-        f"what strikes of events in {found.flights} flights would have been worth, where 1 is a "
-        f"violation: {found.learned:.2f} as the director decides that learns from earlier flights, "
-        f"{found.rule:.2f} by the fixed rule (at 3 m), {found.best:.2f} at best; of {found.struck} "
-        f"that struck it expected {found.expected:.1f} to end with a violation, and "
-        f"{found.violated} did"
+        f"what the strikes of events in {found.flights} flights are worth, in violations per 100: "
+        f"{_above(found)} (at 3 m); {100 * found.best:.1f} at best; of {found.struck} that struck "
+        f"it expected {found.expected:.1f} to end with a violation, and {found.violated} did"
     )
 
 

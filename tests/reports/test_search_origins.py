@@ -200,10 +200,14 @@ def test_the_summary_says_how_good_the_director_was_in_all_generations() -> None
     assert director_text(dataclasses.replace(search, director=first)) == "", "too few to say"
     told = dataclasses.replace(search, director=total([first, quiet, second]))
     assert director_text(told) == (
-        "what begins of 20 NPCs were worth, where 1 is a collision that the system could have "
-        "prevented: 0.25 as the director decides that learns from earlier flights, 0.10 with the "
-        f"weights that ship, 0.05 by the fixed rule (there {RULE.margin_s:g} s before the UAV), "
-        "0.50 at best; of 3 seen coming it expected 1.5 to meet the UAV, and 2 did"
+        "what the begins of 20 NPCs are worth, in preventable collisions per 100: 25.0 as the "
+        "director decides that learns from earlier flights, 20.0 more than by the fixed rule "
+        f"(there {RULE.margin_s:g} s before the UAV); 10.0 with the weights that ship, 50.0 at "
+        "best; of 3 seen coming it expected 1.5 to meet the UAV, and 2 did"
+    )
+    worse = dataclasses.replace(search, director=dataclasses.replace(second, learned=0.0123))
+    assert "1.2 as the director decides that learns from earlier flights, 3.8 less than by " in (
+        director_text(worse)
     )
 
 
@@ -251,7 +255,11 @@ def test_the_summary_says_how_good_the_director_of_events_was() -> None:
     assert event_director_text(few) == "", "too few to say"
     told = dataclasses.replace(search, event_director=total_of_events([first, second]))
     assert event_director_text(told) == (
-        "what strikes of events in 32 flights would have been worth, where 1 is a violation: 0.25 "
-        "as the director decides that learns from earlier flights, 0.10 by the fixed rule (at 3 "
-        "m), 0.35 at best; of 12 that struck it expected 3.5 to end with a violation, and 4 did"
+        "what the strikes of events in 32 flights are worth, in violations per 100: 25.0 as the "
+        "director decides that learns from earlier flights, 15.0 more than by the fixed rule (at 3 "
+        "m); 35.0 at best; of 12 that struck it expected 3.5 to end with a violation, and 4 did"
+    )
+    level = dataclasses.replace(second, struck=12, learned=0.1004)
+    assert "10.0 as the director decides that learns from earlier flights, as much as by the " in (
+        event_director_text(dataclasses.replace(search, event_director=level))
     )
