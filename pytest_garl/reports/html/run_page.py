@@ -172,9 +172,9 @@ def figures(search: SearchRecord) -> list[Fact]:
     if search.movers is not None:
         found.append(("who moved the NPCs", movers_text(search)))
     if search.director is not None:
-        found.append(("what begins of NPCs were worth", director_text(search)))
+        found.append(("how good the director of NPCs was", director_text(search)))
     found.append(("who let events strike", strikes_text(search)))
-    found.append(("what strikes of events were worth", event_director_text(search)))
+    found.append(("how good the director of events was", event_director_text(search)))
     return [figure for figure in found if figure[1]]
 
 
