@@ -25,7 +25,7 @@ from lab.arms import arm_named
 from lab.stand_in import stand_in
 from lab.stand_in_model import StandInModel, perturbed
 from lab.stand_in_way import ORDINARY, STURDY, LandingModel
-from lab.table import Key, ResultTable, Row, run_study
+from lab.table import Key, ResultTable, Row
 from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.maps.loading import load_map
@@ -164,11 +164,11 @@ def main() -> None:
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS), help="arms")
     parser.add_argument("--landings", nargs="+", default=list(LANDINGS))
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    run_study(parser, TABLE, report, fly_searches)
-
-
-def fly_searches(arguments: argparse.Namespace) -> None:
-    """Run the searches that the table lacks."""
+    parser.add_argument("--report", action="store_true", help="print the table, fly nothing")
+    arguments = parser.parse_args()
+    if arguments.report:
+        print(report(TABLE.rows()))
+        return
     keys = itertools.product(arguments.seeds, MAPS, arguments.landings, arguments.variants)
     TABLE.fly_missing(
         ((name, landing, seed, map) for seed, map, landing, name in keys), search, arguments.workers

@@ -45,12 +45,6 @@ class _Off(ast.NodeTransformer):
 
 def perturbed(by: float, seed: int) -> StandIn:
     """Return the stand-in with all of its constants off by up to a share."""
-    found: StandIn = perturbed_copy(by, seed).stand_in
-    return found
-
-
-def perturbed_copy(by: float, seed: int) -> Any:
-    """Return a copy of the stand-in's module, with all of its constants off by up to a share."""
     rng = np.random.default_rng(seed)
     names: dict[str, Any] = {}
     copy: Any = None
@@ -61,7 +55,8 @@ def perturbed_copy(by: float, seed: int) -> Any:
         # What the second one imports of the first one is the original.
         copy.__dict__.update({name: each for name, each in names.items() if name in vars(copy)})
         names = {name: each for name, each in vars(copy).items() if not name.startswith("__")}
-    return copy
+    found: StandIn = copy.stand_in
+    return found
 
 
 class StandInModel(MarginModel):

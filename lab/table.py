@@ -1,8 +1,7 @@
-"""The table of a study: a CSV file that grows while the study runs, and its command line."""
+"""The table of a study: a CSV file that grows while the study runs."""
 
 from __future__ import annotations
 
-import argparse
 import csv
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
@@ -79,21 +78,6 @@ def read_csv(path: Path) -> list[Row]:
         return []
     with path.open(newline="") as file:
         return list(csv.DictReader(file))
-
-
-def run_study(
-    parser: argparse.ArgumentParser,
-    table: ResultTable,
-    report: Callable[[list[Row]], str],
-    fly: Callable[[argparse.Namespace], None],
-) -> None:
-    """Parse the command line; print the report if it asks for it, else fly."""
-    parser.add_argument("--report", action="store_true", help="print the table, fly nothing")
-    arguments = parser.parse_args()
-    if arguments.report:
-        print(report(table.rows()))
-    else:
-        fly(arguments)
 
 
 def share(count: int, total: int) -> str:

@@ -1,8 +1,8 @@
 """The three judges of the search: what evolution and learning are worth, against rivals.
 
 These definitions were written down, and their code was committed, before the first of the seeds
-that they judge was opened.  ``python -m lab.judges power`` says which differences they can see.
-The arms are those of ``lab/arms.py``.
+that they judge was opened.  ``python -m lab.judges power`` of commit 3b6029a said which differences
+they can see.  The arms are those of ``lab/arms.py``.
 
 **Judge 1, faults** (``faults.py``).  The fault suite of ``lab/faults``, searches of 100 flights.
 

@@ -1,10 +1,8 @@
-"""Fly a judge, print its tables, or its power.
+"""Fly a judge, or print its tables.
 
     python -m lab.judges faults --jobs=2          # or causes, or preventable
     python -m lab.judges faults --missed          # 400 flights for what garl and exploring+ missed
     python -m lab.judges faults --report
-    python -m lab.judges power
-    python -m lab.judges margin                   # of the arm `rule`, on a development seed
 
 A judge flies what has no file in its folder, each search in one process of the lowest priority; it
 can be interrupted and started again.  ``--report`` adds the finished files to the judge's table in
@@ -23,7 +21,7 @@ from types import ModuleType
 
 from lab.arms import FROZEN
 from lab.faults.catalogue import FAULTS, PLACEBO
-from lab.judges import causes, faults, margin, power, preventable
+from lab.judges import causes, faults, preventable
 from lab.judges.flights import LANDINGS, SYSTEMS
 from lab.judges.tasks import FOLDER, Task, collect, nice_pool, run
 from lab.table import ResultTable
@@ -47,8 +45,6 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     judges = parser.add_subparsers(dest="judge", required=True)
-    judges.add_parser("power", help="which differences the judges can see")
-    judges.add_parser("margin", help="the best margin of the arm rule, on a development seed")
     for name, judge in JUDGES.items():
         each = judges.add_parser(name)
         each.add_argument("--arms", nargs="+", default=list(judge.ARMS))
@@ -66,9 +62,6 @@ def main() -> None:
                 "--missed", action="store_true", help="fly what was missed for longer"
             )
     named = parser.parse_args()
-    if named.judge in ("power", "margin"):
-        print(power.report() if named.judge == "power" else margin.report([*margin.lessons()]))
-        return
     judge = JUDGES[named.judge]
     table = dataclasses.replace(judge.TABLE, file=named.table)
     tasks = tasks_of(judge, named, table)

@@ -198,7 +198,7 @@ class Valued(Protocol):
 RULE = TimeToGo(margin_s=1.0)
 """The rule that a director must beat, in the summary and for the judges: an NPC is there a second
 before the UAV.  With this margin most of them met the UAV after it had seen them, in recorded
-flights of three landing systems (``python -m lab.judges margin``)."""
+flights of three landing systems (``python -m lab.judges margin`` of commit 3b6029a)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -16,7 +16,7 @@ import pytest
 from lab.arms import arm_named
 from lab.faults.control import ControlSystem
 from lab.judges import __main__ as command
-from lab.judges import causes, faults, margin, power, preventable, tasks
+from lab.judges import causes, faults, preventable, tasks
 from lab.judges.causes import CausesTask, ConfirmedCause, Inventory, Violating, cause_in
 from lab.judges.faults import FaultTask, twin_of
 from lab.judges.flights import OwnFlights
@@ -28,8 +28,6 @@ from pytest_garl import Land, Mission, Observation
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.flight.flight import Contact, Flight, Touchdown, Track
-from pytest_garl.npcs.director import AT, FEATURES, SCALE_S, TimeToGo
-from pytest_garl.npcs.lessons import IN_VIEW, UNSEEN, Forecast, Lesson
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
@@ -450,40 +448,6 @@ def test_an_interval_over_clusters_is_wider_than_one_over_independent_faults() -
 def test_signs_are_flipped_exactly() -> None:
     assert p_of_signs([1.0, 2.0, 3.0, 4.0, 5.0]) == 2 / 32
     assert p_of_signs([1.0, -1.0, 0.5, -0.5]) == 1.0
-
-
-def test_more_pairs_see_a_smaller_difference() -> None:
-    assert power.seen_difference(2.0, 15) < power.seen_difference(2.0, 6)
-    narrow, wide = (Estimate(value=0.8, low=0.8 / w, high=0.8 * w) for w in (1.1, 1.4))
-    assert 0 < power.seen_ratio(wide) < power.seen_ratio(narrow) < 1
-    assert power.power_of_ratio(0.05, 3.0, 400) > power.power_of_ratio(0.05, 1.2, 400)
-
-
-def test_the_power_of_causes_is_that_of_paired_differences() -> None:
-    keys = [(str(seed), landing) for seed in range(204, 208) for landing in ("ordinary", "sturdy")]
-    rows = cause_rows("garl", dict.fromkeys(keys, 12))
-    rows += cause_rows("exploring+", {key: 9 + 2 * (int(key[0]) % 2) for key in keys})
-    text = power.of_stand_in(rows, "exploring+")
-    # Half of the differences are 3, half are 1.
-    assert "paired differences of causes have a standard deviation of 1.1 (8 pairs)" in text
-    assert "15 pairs see a difference of 0.8, 7 % of the mean of 12.0" in text
-
-
-def test_a_margin_is_worth_the_begins_that_meet_in_view() -> None:
-    states = np.zeros((6, len(FEATURES)))
-    states[:, AT["sees"]], states[:, AT["climb"]] = 1.0, -0.5
-    # It has a second less at each decision.
-    states[:, AT["spare"]] = np.arange(5, -1, -1) / SCALE_S
-    shown, hidden = (
-        Forecast(kind=kind, nearest_m=0.0, is_certain=True) for kind in (IN_VIEW, UNSEEN)
-    )
-    lesson = Lesson(
-        states=states, asked=(1, 3, 5), forecasts=(hidden, shown, hidden), own=None, met=False
-    )
-    values = [margin.share(TimeToGo(margin_s=each), [lesson]) for each in (4.0, 3.0, 2.0, 0.0, -1)]
-    assert values == [0.0, 0.5, 1.0, 0.0, 0.0]
-    text = margin.report([(name, lesson) for name in ("opencv", "tphyolo", "mm")])
-    assert text.splitlines()[-1].startswith("| all | 3 | 0 % | 0 % | 0 % | 0 % | 50 % | 50 % |")
 
 
 def test_the_command_prints_what_a_folder_holds(

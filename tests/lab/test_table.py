@@ -1,13 +1,12 @@
 from __future__ import annotations
 
-import argparse
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from lab.table import Key, ResultTable, run_study
+from lab.table import Key, ResultTable
 
 
 def squared(key: Key, pool: Executor) -> dict[str, Any]:
@@ -29,19 +28,6 @@ def test_fly_missing_appends_a_row_for_each_key_without_one(table: ResultTable) 
     table.fly_missing([("2",), ("3",)], squared, workers=1)
     assert table.file.read_bytes() == b"number,square\n2,kept\n3,9\n"
     assert table.keys() == {("2",), ("3",)}
-
-
-def test_report_prints_the_table_and_flies_nothing(
-    table: ResultTable, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    table.append([{"number": 2, "square": 4}])
-    capsys.readouterr()
-    flown: list[argparse.Namespace] = []
-    for words, output, flights in ((["--report"], "1 rows\n", 0), ([], "", 1)):
-        monkeypatch.setattr("sys.argv", ["study", *words])
-        run_study(argparse.ArgumentParser(), table, lambda rows: f"{len(rows)} rows", flown.append)
-        assert capsys.readouterr().out == output
-        assert len(flown) == flights
 
 
 def test_columns_that_an_older_file_lacks_are_empty_and_added_with_the_next_row(

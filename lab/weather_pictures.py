@@ -54,7 +54,7 @@ def sheet(name: str) -> np.ndarray:
 
 def main() -> None:
     """Write docs/pictures/<map>.png."""
-    folder = Path(__file__).parents[2] / "docs" / "pictures"
+    folder = Path(__file__).parents[1] / "docs" / "pictures"
     folder.mkdir(exist_ok=True)
     for name in ("court", "lawn"):
         picture = cv2.cvtColor(sheet(name) & 0xF8, cv2.COLOR_RGB2BGR)  # Five bits compress better.

@@ -1,1 +1,0 @@
-"""Tools that draw pictures for people."""
