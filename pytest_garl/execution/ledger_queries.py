@@ -62,6 +62,11 @@ class LedgerFlight:
         return self.result.signature
 
     @property
+    def seed(self) -> int:
+        """The seed of the scenario."""
+        return parse_scenario(self.scenario).seed
+
+    @property
     def repeatable(self) -> Scenario:
         """The scenario, with what was decided in the flight as its own: it needs no director."""
         return repeatable(self.scenario, self.result)

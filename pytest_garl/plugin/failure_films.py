@@ -121,7 +121,7 @@ def _failed_cases(reporter: Any, run: Run) -> Iterator[_Failure]:
 def _kinds(run: Run, tally: Tally) -> list[_Failure]:
     """Return the first flight of each kind of violation, the most frequent kinds first."""
     found = [
-        (-kind.count, index, _Failure(key=key, name=kind.first, flight=search.flight(kind.first)))
+        (-kind.count, index, _Failure(key=key, name=kind.first, flight=search.by_slot[kind.first]))
         for index, search in enumerate(tally.run_record(run).searches)
         for kind in search.kinds
         for key in [(search.name, kind.signature)]

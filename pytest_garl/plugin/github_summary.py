@@ -12,12 +12,12 @@ import pytest
 from pytest_garl.execution.flight_id import OF_CASE
 from pytest_garl.plugin.item_record import ItemRecord
 from pytest_garl.plugin.run import Run
-from pytest_garl.plugin.suggested_commands import repeat_kind_command
+from pytest_garl.plugin.suggested_commands import repeat_files_command
 from pytest_garl.plugin.summary import renewal_lines
 from pytest_garl.reports.html.index_markdown import index_parts, page_link
 from pytest_garl.reports.markdown import code, escaped, table
 from pytest_garl.reports.run_record import WHY_NO_LANDING, KindRecord, RunRecord, SearchRecord
-from pytest_garl.reports.run_text import PAPER_DEFINITION, kinds_lines, percent
+from pytest_garl.reports.run_text import PAPER_DEFINITION, percent
 
 if TYPE_CHECKING:
     from pytest_garl.reports.html.report import WrittenReport
@@ -66,10 +66,10 @@ def write_step_summary(
         (
             escaped(search.name),
             escaped(kind.signature),
-            escaped(_flights(search, kind)),
+            escaped(_flights(kind)),
             escaped("; ".join(filter(None, (kind.title, kind.headline)))),
             escaped(kind.least),
-            code(repeat_kind_command(search, kind, reporter.config)),
+            code(repeat_files_command(reporter.config, search.key.files, kind.first)),
             pages.get((search.name, kind.signature), ""),
         )
         for search in record.searches
@@ -78,9 +78,7 @@ def write_step_summary(
     rows += _failed_cases(reporter)
     shares = [_shares(search) for search in record.searches]
     parts = [table(SHARES, shares)] if shares else []
-    parts += [
-        escaped(f"{each.name}: {line}") for each in record.searches for line in kinds_lines(each)
-    ]
+    parts += [escaped(f"{each.name}: {line}") for each in record.searches for line in each.remarks]
     flown = f" in {record.flown} flights" if record.flown else ""
     parts.append(_kinds_table(rows) if rows else f"No violation{flown}.")
     parts += [*_failed_beside(reporter), *renewal_lines(reporter)]
@@ -112,11 +110,11 @@ def _kinds_table(rows: Sequence[Row]) -> str:
     return table(COLUMNS[:columns], [row[:columns] for row in rows])
 
 
-def _flights(search: SearchRecord, kind: KindRecord) -> str:
+def _flights(kind: KindRecord) -> str:
     """Return the number of flights of a kind and, with a control arm, of the random ones."""
     if kind.in_control is None:
         return str(kind.count)
-    return f"{kind.count} ({kind.in_control} of {search.random_flights} random)"
+    return f"{kind.count} ({kind.in_control} of {kind.random_flights} random)"
 
 
 def _shares(search: SearchRecord) -> tuple[str, ...]:

@@ -117,10 +117,6 @@ class Films:
     files: Mapping[FilmKey, Path] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    def of_search(self, name: str) -> dict[str, Path]:
-        """Return the films of a search by signature."""
-        return {key[1]: path for key, path in self.files.items() if key[:-1] == (name,)}
-
     @property
     def of_cases(self) -> dict[str, Path]:
         """The films of saved cases by name."""

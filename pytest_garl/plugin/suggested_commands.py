@@ -13,7 +13,6 @@ from pytest_garl.messages import command, printable
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.target import Target
-    from pytest_garl.reports.run_record import KindRecord, SearchRecord
 
 _FOLDERS = ("garl_dir", "garl_cases")
 
@@ -51,7 +50,8 @@ def shown_path(path: Path, config: pytest.Config) -> str:
     return printable(str(found), keep="")
 
 
-def repeat_kind_command(search: SearchRecord, kind: KindRecord, config: pytest.Config) -> str:
-    """Return the command that repeats the first flight of a kind."""
-    files = [shown_path(config.rootpath / file, config) for file in search.key.files]
-    return repeat_command(config, files, kind.first)
+def repeat_files_command(config: pytest.Config, files: Iterable[str], scenario: str) -> str:
+    """Return the command that flies a scenario again in files, named as seen from the root."""
+    return repeat_command(
+        config, (shown_path(config.rootpath / file, config) for file in files), scenario
+    )

@@ -16,23 +16,18 @@ from pytest_garl.plugin.header import cpu_dispatch_warning
 from pytest_garl.plugin.item_record import records
 from pytest_garl.plugin.landing import NOT_JUDGED
 from pytest_garl.plugin.options import Options
-from pytest_garl.plugin.run import Films, Run
+from pytest_garl.plugin.run import FilmKey, Films, Run
 from pytest_garl.plugin.save_cases import saved_lines
 from pytest_garl.plugin.session_status import notes
-from pytest_garl.plugin.suggested_commands import repeat_kind_command, shown_path
+from pytest_garl.plugin.suggested_commands import repeat_files_command, shown_path
 from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import counted, width_of, wrapped
-from pytest_garl.reports.run_record import KindRecord, RunRecord, SearchRecord
-from pytest_garl.reports.run_text import (
-    LEGEND,
-    headline_shares,
-    in_control_text,
-    kinds_lines,
-    share_lines,
-)
+from pytest_garl.reports.run_record import WHY_NO_LANDING, KindRecord, RunRecord, SearchRecord
+from pytest_garl.reports.run_text import LEGEND, PAPER_DEFINITION, limits_text, percent
 from pytest_garl.search.method_catalogue import remembers
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
-NO_FILMS: Mapping[str, Path] = MappingProxyType({})
+NO_FILMS: Mapping[FilmKey, Path] = MappingProxyType({})
 _SKIPPED = f"Skipped: {NOT_JUDGED}:"
 """Begins pytest's reason for a test that its flight does not judge."""
 
@@ -131,7 +126,7 @@ def _lines_about(record: RunRecord, run: Run, tally: Tally, reporter: Any) -> li
     lines += [
         line
         for each in record.searches
-        for line in search_table(each, reporter.config, width, films.of_search(each.name))
+        for line in search_table(each, reporter.config, width, films.files)
     ]
     types = legend((*record.kinds, *(finding for _, finding in record.findings)))
     lines += [wrapped(text, width) for text in (types, _costs(record, run.options)) if text]
@@ -214,18 +209,17 @@ def search_table(
     search: SearchRecord,
     config: pytest.Config,
     width: int,
-    films: Mapping[str, Path] = NO_FILMS,
+    films: Mapping[FilmKey, Path] = NO_FILMS,
 ) -> list[str]:
     """Return the shares of a search, then each kind of violation and how to see it.
 
-    ``films`` are those of the kinds by signature.  What else was noted
-    follows; no item fails for it.
+    What else was noted follows; no item fails for it.
     """
     lines = [
         wrapped(f"{search.name}: {headline_shares(search)}", width, others="  "),
         *(
             wrapped(line, width, first="  ", others="    ")
-            for line in (*share_lines(search), *kinds_lines(search))
+            for line in (*share_lines(search), *search.remarks)
         ),
         *_kind_lines(search, search.kinds, config, width, films),
     ]
@@ -235,26 +229,76 @@ def search_table(
     return lines
 
 
+def headline_shares(search: SearchRecord) -> str:
+    """Return such as ``60 flown, landed 55.0 %, violations 40.0 % [27.6, 53.5]``."""
+    total = search.flown
+    low, high = search.violating_interval
+    shares = [f"{total} flown", f"landed {percent(search.landed, total)}"]
+    if search.completed != search.landed:
+        shares.append(f"within the limit of distance {percent(search.completed, total)}")
+    violations = percent(search.violating, total)
+    return ", ".join([*shares, f"violations {violations} [{100 * low:.1f}, {100 * high:.1f}]"])
+
+
+def share_lines(search: SearchRecord) -> list[str]:
+    """Return the other shares: the paper's definition, no landing, crashes, figures, limits."""
+    paper = percent(search.violating_by_the_paper, search.flown)
+    tenth = search.tenth_violation
+    found = f", the tenth in flight {tenth}" if tenth else ""
+    return [
+        f"{PAPER_DEFINITION}: violations {paper}{found}",
+        _no_landing(search),
+        _landings(search),
+        f"distance decided in {search.decided['distance']} of {search.flown} flights, "
+        f"time in {search.decided['time']}",
+        *(f"limits: {limits_text(each)}" for each in search.limits if each != DEFAULT_LIMITS),
+    ]
+
+
+def _no_landing(search: SearchRecord) -> str:
+    """Return the flights that gave up and those without landing, by reason, and the crashes."""
+    total, gave_up, not_landed = search.flown, search.gave_up, search.not_landed
+    shares = [f"{reason} {percent(gave_up[reason], total)}" for reason in WHY_NO_LANDING]
+    parts = [f"gave up: {', '.join(shares)}"]
+    forced = [f"{why} {not_landed[why]}" for why in WHY_NO_LANDING[1:] if not_landed[why]]
+    reasons = f" (of them {', '.join(forced)})" if forced else ""
+    parts.append(f"not landed {percent(sum(not_landed.values()), total)}{reasons}")
+    parts += [f"{kind} {percent(count, total)}" for kind, count in search.crashes.items()]
+    if search.inconclusive:
+        parts.append(f"inconclusive {len(search.inconclusive)}")
+    return "; ".join(parts)
+
+
+def _landings(search: SearchRecord) -> str:
+    """Return the median and the worst figures of the flights that landed, or that none did."""
+    distance_m, time_s = search.landing_distance_m, search.landing_time_s
+    if distance_m is None or time_s is None:
+        return "landed 0 %: no flight landed, so nothing is known of its landings"
+    return (
+        f"landings: distance median {distance_m.median:.2f} m, worst {distance_m.worst:.2f} m; "
+        f"time median {time_s.median:.1f} s, worst {time_s.worst:.1f} s"
+    )
+
+
 def _kind_lines(
     search: SearchRecord,
     kinds: Sequence[KindRecord],
     config: pytest.Config,
     width: int,
-    films: Mapping[str, Path] = NO_FILMS,
+    films: Mapping[FilmKey, Path] = NO_FILMS,
 ) -> list[str]:
     lines = []
     longest = max((len(kind.signature) for kind in kinds), default=0)
     for kind in kinds:
         signature = f"  {kind.count:4d}  {kind.signature:<{longest}}"
-        command = repeat_kind_command(search, kind, config)
+        command = repeat_files_command(config, search.key.files, kind.first)
         fits = len(signature) + 2 + len(command) <= width
         lines += [f"{signature}  {command}"] if fits else [signature.rstrip(), f"{'':8}{command}"]
         for text in filter(None, (kind.title, kind.headline)):
             lines.append(wrapped(text, width, first=" " * 8, others=" " * 8))
-        seen = in_control_text(kind.in_control, search.random_flights)
-        facts = "; ".join(fact for fact in (kind.least, seen) if fact)
+        facts = "; ".join(filter(None, (kind.least, kind.seen_in_control)))
         if facts:
             lines.append(wrapped(facts, width, first=" " * 8, others=" " * 10))
-        if kind.signature in films:
-            lines.append(f"{'':8}film: {shown_path(films[kind.signature], config)}")
+        if film := films.get((search.name, kind.signature)):
+            lines.append(f"{'':8}film: {shown_path(film, config)}")
     return lines

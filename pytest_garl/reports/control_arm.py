@@ -72,8 +72,9 @@ class ControlArm:
         """Whether both arms have the flights that a comparison takes."""
         return min(self.random.flights, self.later.flights) >= LEAST_FLIGHTS
 
+    @property
     def at_equal_flights(self) -> AtEqualFlights | None:
-        """Return the comparison at the number of flights of the smaller arm; None if too few."""
+        """The comparison at the number of flights of the smaller arm; None if too few."""
         if not self.enough:
             return None
         flights = min(self.random.flights, self.later.flights)

@@ -19,8 +19,6 @@ from pytest_garl.reports.run_record import (
     SearchRecord,
     Spread,
 )
-from pytest_garl.reports.run_text import control_text, repeat_command
-from pytest_garl.scenarios.files import parse_scenario
 
 VERSION = 1
 SCHEMA = Path(__file__).with_name("report.schema.json")
@@ -48,12 +46,12 @@ def run_as_json(run: RunRecord) -> dict[str, Any]:
             "flown_again": run.costs.flown_again,
             "beside": run.costs.beside,
         },
-        "searches": [_search(run, each) for each in run.searches],
+        "searches": [_search(each) for each in run.searches],
         "cases": [_case(each) for each in run.cases],
     }
 
 
-def _search(run: RunRecord, search: SearchRecord) -> dict[str, Any]:
+def _search(search: SearchRecord) -> dict[str, Any]:
     return {
         "system": search.key.system,
         "map": search.key.map,
@@ -75,10 +73,10 @@ def _search(run: RunRecord, search: SearchRecord) -> dict[str, Any]:
         "landing_time_s": _spread(search.landing_time_s),
         "outcomes": dict(sorted(search.outcomes.items())),
         "types": dict(sorted(search.types.items())),
-        "decided": {"distance": search.decided("distance"), "time": search.decided("time")},
+        "decided": dict(search.decided),
         "causes": search.causes,
         "effective_kinds": round(search.effective_kinds, 4),
-        "control": _control(search, search.control) if search.control else None,
+        "control": search.control and _control(search.control, search.told["control"]),
         "origins": [dataclasses.asdict(each) for each in search.origins],
         "model": None if search.model is None else dataclasses.asdict(search.model),
         "movers": None if search.movers is None else dataclasses.asdict(search.movers),
@@ -89,7 +87,7 @@ def _search(run: RunRecord, search: SearchRecord) -> dict[str, Any]:
         else dataclasses.asdict(search.event_director),
         "signatures": [
             {
-                **_kind(run, search, kind),
+                **_kind(search, kind),
                 "title": kind.title,
                 "cause": None if kind.cause is None else list(kind.cause),
                 "severity": _severity(kind),
@@ -98,7 +96,7 @@ def _search(run: RunRecord, search: SearchRecord) -> dict[str, Any]:
             }
             for kind in search.kinds
         ],
-        "findings": [_kind(run, search, finding) for finding in search.findings],
+        "findings": [_kind(search, finding) for finding in search.findings],
     }
 
 
@@ -109,15 +107,15 @@ def _told_apart(search: SearchRecord) -> dict[str, Any]:
     return {"name": search.name, "domain": search.key.domain, "tests": list(search.key.tests)}
 
 
-def _kind(run: RunRecord, search: SearchRecord, kind: KindRecord) -> dict[str, Any]:
+def _kind(search: SearchRecord, kind: KindRecord) -> dict[str, Any]:
     return {
         "signature": kind.signature,
         "type": kind.type,
         "count": kind.count,
-        "first": _flight(search.flight(kind.first)),
+        "first": _flight(search.by_slot[kind.first]),
         "story": kind.story,
         "headline": kind.headline,
-        "repeat": repeat_command(run, search, kind),
+        "repeat": kind.repeat,
     }
 
 
@@ -128,9 +126,9 @@ def _severity(kind: KindRecord) -> dict[str, Any] | None:
     return kind.severity.to_json(took=False) if kind.severity else None
 
 
-def _control(search: SearchRecord, control: ControlArm) -> dict[str, Any]:
+def _control(control: ControlArm, text: str) -> dict[str, Any]:
     """Return the random flights and the later ones, also at the smaller of the two numbers."""
-    found = control.at_equal_flights()
+    found = control.at_equal_flights
     arms = {
         name: {"flights": arm.flights, "kinds": arm.kinds}
         for name, arm in (("random", control.random), ("later", control.later))
@@ -140,7 +138,7 @@ def _control(search: SearchRecord, control: ControlArm) -> dict[str, Any]:
         "random": {"mean": round(found.random, 4), "range_95": list(found.random_range)},
         "later": {"mean": round(found.later, 4), "range_95": list(found.later_range)},
     }
-    return {**arms, "at_equal_flights": equal, "text": control_text(search)}
+    return {**arms, "at_equal_flights": equal, "text": text}
 
 
 def _spread(spread: Spread | None) -> dict[str, float] | None:
@@ -150,7 +148,7 @@ def _spread(spread: Spread | None) -> dict[str, float] | None:
 def _flight(flight: LedgerFlight) -> dict[str, Any]:
     return {
         "slot": flight.id.slot_id,
-        "seed": parse_scenario(flight.scenario).seed,
+        "seed": flight.seed,
         "outcome": flight.result.outcome,
         "final_distance_m": flight.result.final_distance_m,
         "elapsed_s": flight.result.elapsed_s,

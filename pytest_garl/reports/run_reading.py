@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
@@ -19,6 +20,8 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import Origin
 from pytest_garl.execution.severity import Severity
 from pytest_garl.execution.stored_ledger import checked_ledger
+from pytest_garl.files.run_files import RUN_FOLDER
+from pytest_garl.messages import command
 from pytest_garl.npcs.director_progress import total, total_of_events
 from pytest_garl.npcs.event_lessons import learned_kinds
 from pytest_garl.reports.control_arm import control_arm, is_control
@@ -111,7 +114,8 @@ def _searches(ledger: Ledger, jobs: dict[str, FlightJob]) -> list[SearchRecord]:
         ids = dict.fromkeys(each.id.search for each in flights)
         own = {search: parse_job(ledger.job(search) or "") for search in ids}
         jobs |= own
-        found.append(_search(ledger.facts, key, names[key], wanted[key], flights, own))
+        repeat = functools.partial(_repeat_command, ledger.path.parent.name, key.files)
+        found.append(_search(ledger.facts, key, names[key], wanted[key], flights, own, repeat))
     return found
 
 
@@ -122,8 +126,12 @@ def _search(
     wanted: int,
     flights: Sequence[LedgerFlight],
     jobs: Mapping[str, FlightJob],
+    repeat: Callable[[str], str],
 ) -> SearchRecord:
-    """Return a search with these flights, and the jobs of them by their key in the ledger."""
+    """Return a search with these flights, and the jobs of them by their key in the ledger.
+
+    ``repeat`` makes the command that repeats a slot.
+    """
     # (slot, story) of all violations, by signature.
     violations: dict[str, list[tuple[str, str]]] = {}
     findings: dict[str, list[tuple[str, str]]] = {}
@@ -148,10 +156,12 @@ def _search(
         key=key,
         name=name,
         flights=tuple(flights),
-        kinds=kinds_of(violations, _lowest_severities(flights), random if compares else None),
+        kinds=kinds_of(
+            violations, _lowest_severities(flights), random if compares else None, repeat
+        ),
         violating=len({slot for items in violations.values() for slot, _ in items}),
         wanted=wanted,
-        findings=kinds_of(findings),
+        findings=kinds_of(findings, repeat=repeat),
         limits=tuple(dict.fromkeys(each.limits for each in jobs.values())),
         npcs=tuple(dict.fromkeys(each.npcs.name for each in jobs.values())),
         control=control,
@@ -165,6 +175,12 @@ def _search(
         event_director=total_of_events(each.events for each in progress),
         camera=facts.camera(key.system),
     )
+
+
+def _repeat_command(folder: str, files: Sequence[str], slot: str) -> str:
+    """Return the command that repeats a slot, called beside the folder of the ledger."""
+    words = ["pytest", *files, f"--garl-repeat={slot}"]
+    return command(*words, *(() if folder == RUN_FOLDER else ("-o", f"garl_dir={folder}")))
 
 
 def _with_origins(facts: Facts, flights: Sequence[LedgerFlight]) -> Made:
@@ -223,6 +239,7 @@ def kinds_of(
     stories: Mapping[str, Sequence[tuple[str, str]]],
     severities: Mapping[str, tuple[Severity, str]] = _NONE,
     random_slots: Set[str] | None = None,
+    repeat: Callable[[str], str] = lambda slot: "",
 ) -> tuple[KindRecord, ...]:
     """Return the kinds in (slot, story) by signature, the most frequent first."""
     kinds = []
@@ -238,6 +255,8 @@ def kinds_of(
                 severity=severity,
                 severest=severest,
                 in_control=in_control,
+                random_flights=len(random_slots or ()),
+                repeat=repeat(slots[0]),
             )
         )
     return tuple(sorted(kinds, key=lambda each: (-each.count, each.signature)))

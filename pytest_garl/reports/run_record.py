@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 from pytest_garl.cases.case import Case
 from pytest_garl.execution.facts import SearchKey
@@ -30,7 +30,15 @@ from pytest_garl.reports.search_origins import (
     OriginRecord,
     StrikeRecord,
 )
-from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.reports.sentences import (
+    control_text,
+    counted_causes,
+    director_text,
+    event_director_text,
+    movers_text,
+    origins_text,
+    strikes_text,
+)
 from pytest_garl.verdicts.ending import ending_of
 from pytest_garl.verdicts.kinds import hill_number
 from pytest_garl.verdicts.paper_metrics import top_k
@@ -39,6 +47,8 @@ from pytest_garl.verdicts.verdict import Limits, NoLanding, PropertyName, Verdic
 from pytest_garl.verdicts.wording import headline
 
 T = TypeVar("T")
+Subject = Literal["control", "origins", "movers", "director", "strikes", "event director"]
+"""What a sentence about a search tells of."""
 WHY_NO_LANDING: tuple[NoLanding, ...] = ("needless", "excused", "blocked")
 """Columns of the flights without landing: somebody could have landed; nobody could have read the
 marker for long enough; something never left it free for long enough."""
@@ -82,9 +92,10 @@ class KindRecord:
 
     ``slots`` are those of its flights, ``first`` is the first of them, and ``story`` what happened
     there.  ``severity`` is the lowest of these flights, None if none is known, and ``severest`` the
-    first slot with it.  ``in_control`` is the number of random flights that show it, None without a
-    control arm to compare with.  ``saved`` are the saved cases that end as it does.  ``case`` is
-    the shrunk case that tells its cause, None if nobody knows the cause.
+    first slot with it.  ``in_control`` is the number of random flights that show it, of
+    ``random_flights``; None without a control arm to compare with.  ``repeat`` is the command that
+    repeats the first flight, called beside the ledger.  ``saved`` are the saved cases that end as
+    it does.  ``case`` is the shrunk case that tells its cause, None if nobody knows the cause.
     """
 
     signature: str
@@ -93,6 +104,8 @@ class KindRecord:
     severity: Severity | None = None
     severest: str = ""
     in_control: int | None = None
+    random_flights: int = 0
+    repeat: str = ""
     saved: tuple[SavedCase, ...] = ()
     case: Case | None = None
 
@@ -145,6 +158,13 @@ class KindRecord:
         return f"unusual in {self.severest}: {self.severity.unusual or 'nothing'}"
 
     @property
+    def seen_in_control(self) -> str:
+        """In how many of the random flights it was seen; empty without a control arm."""
+        if self.in_control is None:
+            return ""
+        return f"seen in {self.in_control} of {self.random_flights} random flights"
+
+    @property
     def shown_case(self) -> SavedCase | None:
         """The saved case that tells its cause; else the first, None without one."""
         first = self.saved[0] if self.saved else None
@@ -172,7 +192,7 @@ class KindRecord:
         ]
         if len(telling) > 1:
             # Shrinking and twins keep the seed of the flight with which they began.
-            seeds = [parse_scenario(each.scenario).seed for each in flights]
+            seeds = [each.seed for each in flights]
             order = {seed: number for number, seed in reversed([*enumerate(seeds)])}
             telling.sort(key=lambda case: order.get(case.scenario.seed, len(seeds)))
         return dataclasses.replace(self, saved=mine, case=next(iter(telling), None))
@@ -234,9 +254,10 @@ class SearchRecord:
         """The verdicts of the flights."""
         return tuple(each.result.verdict for each in self.flights)
 
-    def flight(self, slot: str) -> LedgerFlight:
-        """Return the flight of a slot, such as ``court-g03-s17``."""
-        return next(each for each in self.flights if each.id.slot_id == slot)
+    @property
+    def by_slot(self) -> Mapping[str, LedgerFlight]:
+        """The first flight of each slot, such as ``court-g03-s17``."""
+        return {each.id.slot_id: each for each in reversed(self.flights)}
 
     @property
     def flown(self) -> int:
@@ -308,9 +329,11 @@ class SearchRecord:
         """How many flights have which type of violation, built in."""
         return Counter(str(each.violation_type) for each in self.verdicts if each.violation_type)
 
-    def decided(self, name: PropertyName) -> int:
-        """Return how many flights decided a property: it held, or it was violated."""
-        return count_decided(self.verdicts, name)
+    @property
+    def decided(self) -> Mapping[PropertyName, int]:
+        """How many flights decided where and when to land: it held, or it was violated."""
+        names: Sequence[PropertyName] = ("distance", "time")
+        return {name: count_decided(self.verdicts, name) for name in names}
 
     @property
     def landing_distance_m(self) -> Spread | None:
@@ -336,9 +359,34 @@ class SearchRecord:
         return hill_number([kind.count for kind in self.kinds], 1)
 
     @property
-    def random_flights(self) -> int:
-        """The number of flights of the control arm, 0 without one."""
-        return self.control.random.flights if self.control else 0
+    def diversity(self) -> str:
+        """How diverse its kinds of violation are; empty for fewer than two."""
+        if len(self.kinds) < 2:
+            return ""
+        causes = counted_causes([kind.cause for kind in self.kinds])
+        return (
+            f"{len(self.kinds)} kinds of violation{', ' * bool(causes)}{causes}, as diverse as "
+            f"{self.effective_kinds:.1f} equally frequent ones"
+        )
+
+    @property
+    def told(self) -> Mapping[Subject, str]:
+        """What it found beside chance, and who decided what in it, by subject."""
+        own = any(kind.type == "own" for kind in self.kinds)
+        texts: Mapping[Subject, str] = {
+            "control": control_text(self.control, has_own=own),
+            "origins": origins_text(self.origins, self.model),
+            "movers": movers_text(self.movers, self.npcs),
+            "director": director_text(self.director),
+            "strikes": strikes_text(self.strikes),
+            "event director": event_director_text(self.event_director),
+        }
+        return {subject: text for subject, text in texts.items() if text}
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """How diverse its kinds are, and all that is told of it."""
+        return tuple(filter(None, (self.diversity, *self.told.values())))
 
     @property
     def ends(self) -> Counter[str]:
@@ -364,7 +412,7 @@ class SearchRecord:
 
     def with_cases(self, saved: Sequence[SavedCase], others: Sequence[Case] = ()) -> Self:
         """Return it with the causes that cases tell; kinds of one cause stand together."""
-        flights = {each.id.slot_id: each for each in self.flights}
+        flights = self.by_slot
         told = [
             kind.with_cases(
                 self.key, saved, others, [flights[slot] for slot in kind.slots if slot in flights]

@@ -249,9 +249,8 @@ def test_the_most_frequent_kinds_have_films_and_the_others_are_named(
     asked = pretend(monkeypatch)
     found = failure_films.draw_failures(session.reporter, session.run, session.tally)
     assert asked == [f"lawn-g00-s{n:02d}.mp4" for n in (1, 0, 3, 4, 5, 6, 7, 8, 9, 10)]
-    of_search = found.of_search("Hovers on lawn")
-    assert of_search["II:lost:01"].name == "lawn-g00-s01.mp4"
-    assert len(of_search) == 10
+    assert found.files["Hovers on lawn", "II:lost:01"].name == "lawn-g00-s01.mp4"
+    assert len(found.files) == 10
     assert session.reporter.lines == ["garl: drawing 10 films of what failed, about 30 s"]
     assert found.notes[0].startswith("10 films of what failed in ")
     assert found.notes[1:] == (

@@ -118,7 +118,7 @@ def test_a_repeated_slot_has_the_scenario_of_its_own_search(pytester: pytest.Pyt
         (pytester.path / file).write_text(SEED.format(domain=domain))
     run(pytester, "--garl-budget=2", "--garl-workers=0")
     seeds = {
-        each.key.domain: parse_scenario(each.flight("lawn-g00-s01").scenario).seed
+        each.key.domain: parse_scenario(each.by_slot["lawn-g00-s01"].scenario).seed
         for each in record(pytester.path).searches
     }
     assert seeds["calm"] != seeds["paper"]

@@ -14,7 +14,7 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.severity import Severity
 from pytest_garl.reports.causes import cause_of, title_of
 from pytest_garl.reports.run_record import KindRecord, SavedCase, SearchRecord
-from pytest_garl.reports.run_text import counted_causes
+from pytest_garl.reports.sentences import counted_causes
 from pytest_garl.scenarios.files import dump_scenario
 from tests.cases.samples import SYSTEM, case
 from tests.support.results import flight_result
@@ -195,9 +195,9 @@ def test_kinds_of_one_cause_stand_together_and_are_counted() -> None:
         "V:ValueError@x",
     ]
     assert told.causes == 2
-    text = counted_causes(told.kinds)
-    assert text == "3 of them shrunk, with 2 causes"
-    assert counted_causes(told.kinds[:3]) == "2 causes"
+    causes = [each.cause for each in told.kinds]
+    assert counted_causes(causes) == "3 of them shrunk, with 2 causes"
+    assert counted_causes(causes[:3]) == "2 causes"
 
 
 def test_the_least_comes_from_the_case_once_there_is_one() -> None:

@@ -15,7 +15,6 @@ from pytest_garl.plugin.summary import search_table
 from pytest_garl.reports.control_arm import LEAST_FLIGHTS, control_arm, is_control
 from pytest_garl.reports.run_reading import kinds_of
 from pytest_garl.reports.run_record import SearchRecord
-from pytest_garl.reports.run_text import control_text, kinds_lines
 from tests.support.results import flight_result
 
 DOG, BIRD, LOST = "IV:dog:descent:seen", "IV:bird:descent:seen", "II:lost:descent"
@@ -59,13 +58,13 @@ def record(
 
 
 def text(*generations: Sequence[str]) -> str:
-    return control_text(record(flights(*generations)))
+    return record(flights(*generations)).told["control"]
 
 
 @pytest.mark.parametrize("method", ["random", "garl-paper", "ga", "mine:Garl", "", None, 3])
 def test_other_methods_have_no_control_arm(method: Any) -> None:
     assert control_arm(method, flights([DOG] * 40, [DOG] * 40)) is None
-    assert control_text(record(flights([DOG] * 40, [DOG]), method)) == ""
+    assert "control" not in record(flights([DOG] * 40, [DOG]), method).told
 
 
 def test_generation_0_of_garl_is_the_control_arm() -> None:
@@ -99,7 +98,7 @@ def test_random_flights_that_are_too_few_decide_nothing() -> None:
     assert "too few" not in text([*few, ""], [DOG] * 20)
     arm = control_arm("garl", flights(few, [DOG] * 99))
     assert arm is not None
-    assert arm.at_equal_flights() is None
+    assert arm.at_equal_flights is None
 
 
 def test_budget_within_the_first_generation_leaves_nothing_to_compare() -> None:
@@ -116,7 +115,7 @@ def test_assertions_of_the_user_are_left_out_of_the_comparison_but_counted_by_ki
     search = record(flights([DOG] * 20, [""] * 20), own=("lawn-g00-s00", "lawn-g01-s00"))
     assert search.control is not None
     assert search.control.random.kinds == 1
-    assert control_text(search).endswith("(assertions of your own left out)")
+    assert search.told["control"].endswith("(assertions of your own left out)")
     assert {kind.signature: kind.in_control for kind in search.kinds} == {
         DOG: 20,
         "own:test_it:1234": 1,
@@ -131,14 +130,14 @@ def test_table_says_of_each_kind_in_how_many_random_flights_it_was_seen(
     assert "2 kinds of violation, as diverse as 1.8 equally frequent ones" in lines
     assert "seen in 1 of 2 random flights" in lines
     assert "seen in 0 of 2 random flights" in lines
-    assert [_flights(search, kind) for kind in search.kinds] == [
+    assert [_flights(kind) for kind in search.kinds] == [
         "3 (0 of 2 random)",
         "1 (1 of 2 random)",
     ]
     other = record(flights([DOG, ""], [BIRD, BIRD, BIRD]), "random")
     assert "random flights" not in "\n".join(search_table(other, pytestconfig, 120))
-    assert [_flights(other, kind) for kind in other.kinds] == ["3", "1"]
+    assert [_flights(kind) for kind in other.kinds] == ["3", "1"]
 
 
 def test_one_kind_alone_has_no_diversity() -> None:
-    assert kinds_lines(record(flights([DOG, DOG]), "random")) == []
+    assert record(flights([DOG, DOG]), "random").remarks == ()

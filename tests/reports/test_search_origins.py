@@ -20,13 +20,6 @@ from pytest_garl.npcs.director_progress import (
 )
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.reports.run_record import SearchRecord
-from pytest_garl.reports.run_text import (
-    director_text,
-    event_director_text,
-    movers_text,
-    origins_text,
-    strikes_text,
-)
 from pytest_garl.reports.search_origins import (
     MoverRecord,
     StrikeRecord,
@@ -116,14 +109,14 @@ def test_the_summary_tells_it_in_one_line() -> None:
     key = SearchKey(system="my_landing:Mine", map="lawn")
     flights = tuple(each for each, _ in MADE)
     search = SearchRecord(key=key, name=key.place, flights=flights, kinds=(), violating=0)
-    assert origins_text(search) == ""
+    assert "origins" not in search.told
     told = dataclasses.replace(search, origins=origin_records(MADE), model=model_record(MADE))
-    assert origins_text(told) == (
+    assert told.told["origins"] == (
         "new kinds: 1 in 2 random flights, 1 in 1 stratified ones, 1 in 3 bred ones "
         "(3 of these violate; the model expected 1.2)"
     )
     drawn = dataclasses.replace(told, origins=told.origins[:2], model=None)
-    assert origins_text(drawn) == "new kinds: 1 in 2 random flights, 1 in 1 stratified ones"
+    assert drawn.told["origins"] == "new kinds: 1 in 2 random flights, 1 in 1 stratified ones"
 
 
 def with_story(grade: str, moment: str, *, name: str = "dog-1") -> LedgerFlight:
@@ -161,18 +154,18 @@ def test_a_forced_grade_decides_for_all_npcs_or_for_none() -> None:
 def test_who_moved_the_npcs_is_told_in_one_line() -> None:
     key = SearchKey(system="my_landing:Mine", map="lawn")
     search = SearchRecord(key=key, name=key.place, flights=(), kinds=(), violating=0)
-    assert movers_text(search) == ""
+    assert "movers" not in search.told
     told = dataclasses.replace(
         search, movers=mover_record((each, policy_spec("graded")) for each in STORIES)
     )
-    assert movers_text(told) == (
+    assert told.told["movers"] == (
         "who said when NPCs begin: the learned director for 2, the rule (just in time) for 2, "
         "their genes for 2; the director decided in 2 of 4 flights with an NPC that knows of the "
         "UAV"
     )
     movers = mover_record([(STORIES[0], policy_spec("dqn"))])
     moved = dataclasses.replace(search, movers=movers, npcs=("dqn",))
-    assert movers_text(moved) == "who said when NPCs begin: the policy dqn for 1"
+    assert moved.told["movers"] == "who said when NPCs begin: the policy dqn for 1"
 
 
 def test_the_summary_says_how_good_the_director_was_in_all_generations() -> None:
@@ -196,18 +189,19 @@ def test_the_summary_says_how_good_the_director_was_in_all_generations() -> None
     assert total([quiet, first]) == first
     key = SearchKey(system="m:S", map="lawn")
     search = SearchRecord(key=key, name=key.place, flights=(), kinds=(), violating=0)
-    assert director_text(search) == ""
-    assert director_text(dataclasses.replace(search, director=first)) == "", "too few to say"
+    assert "director" not in search.told
+    assert "director" not in dataclasses.replace(search, director=first).told, "too few to say"
     told = dataclasses.replace(search, director=total([first, quiet, second]))
-    assert director_text(told) == (
+    assert told.told["director"] == (
         "what the begins of 20 NPCs are worth, in preventable collisions per 100: 25.0 as the "
         "director decides that learns from earlier flights, 20.0 more than by the fixed rule "
         f"(there {RULE.margin_s:g} s before the UAV); 10.0 with the weights that ship, 50.0 at "
         "best; of 3 seen coming it expected 1.5 to meet the UAV, and 2 did"
     )
     worse = dataclasses.replace(search, director=dataclasses.replace(second, learned=0.0123))
-    assert "1.2 as the director decides that learns from earlier flights, 3.8 less than by " in (
-        director_text(worse)
+    assert (
+        "1.2 as the director decides that learns from earlier flights, 3.8 less than by "
+        in (worse.told["director"])
     )
 
 
@@ -232,8 +226,8 @@ def test_events_are_told_by_who_says_when_they_strike() -> None:
     found = strike_record(flown)
     assert found == StrikeRecord(director=2, rule=2, gene=2)
     assert strike_record(flown[6:]) is None
-    assert strikes_text(search) == ""
-    assert strikes_text(dataclasses.replace(search, strikes=found)) == (
+    assert "strikes" not in search.told
+    assert dataclasses.replace(search, strikes=found).told["strikes"] == (
         "who said when events strike: the learned director for 2, the rule (at 3 m) for 2, their "
         "genes for 2"
     )
@@ -250,16 +244,17 @@ def test_the_summary_says_how_good_the_director_of_events_was() -> None:
     assert total_of_events([quiet]) is None
     key = SearchKey(system="m:S", map="lawn")
     search = SearchRecord(key=key, name=key.place, flights=(), kinds=(), violating=0)
-    assert event_director_text(search) == ""
+    assert "event director" not in search.told
     few = dataclasses.replace(search, event_director=total_of_events([first]))
-    assert event_director_text(few) == "", "too few to say"
+    assert "event director" not in few.told, "too few to say"
     told = dataclasses.replace(search, event_director=total_of_events([first, second]))
-    assert event_director_text(told) == (
+    assert told.told["event director"] == (
         "what the strikes of events in 32 flights are worth, in violations per 100: 25.0 as the "
         "director decides that learns from earlier flights, 15.0 more than by the fixed rule (at 3 "
         "m); 35.0 at best; of 12 that struck it expected 3.5 to end with a violation, and 4 did"
     )
     level = dataclasses.replace(second, struck=12, learned=0.1004)
-    assert "10.0 as the director decides that learns from earlier flights, as much as by the " in (
-        event_director_text(dataclasses.replace(search, event_director=level))
+    assert (
+        "10.0 as the director decides that learns from earlier flights, as much as by the "
+        in (dataclasses.replace(search, event_director=level).told["event director"])
     )

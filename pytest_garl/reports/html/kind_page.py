@@ -14,7 +14,7 @@ from pytest_garl.reports.html.flight_tables import cut_text
 from pytest_garl.reports.html.flight_task import FlightTask, ShownFlight, task_of
 from pytest_garl.reports.html.naming import page_address, page_name, shown_file
 from pytest_garl.reports.run_record import KindRecord, RunRecord, SavedCase, SearchRecord
-from pytest_garl.reports.run_text import LEGEND, in_control_text, repeat_command
+from pytest_garl.reports.run_text import LEGEND
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.verdicts.wording import headline
 
@@ -35,7 +35,6 @@ class KindPlan:
     name: str
     search: SearchRecord
     kind: KindRecord
-    repeat: str
     task: FlightTask
     found: FlightTask | None
 
@@ -89,7 +88,7 @@ def plan_kinds(run: RunRecord, films: int) -> list[KindPlan]:
     filmed = {*frequent[:films]}
     plans = []
     for number, (search, kind) in enumerate(kinds):
-        as_found = _task(run, search, search.flight(kind.first))
+        as_found = _task(run, search, search.by_slot[kind.first])
         task = _case_task(run, search, kind.shown_case) or as_found
         task = dataclasses.replace(task, with_film=number in filmed)
         plans.append(
@@ -97,7 +96,6 @@ def plan_kinds(run: RunRecord, films: int) -> list[KindPlan]:
                 name=page_name(search.key.system, search.key.map, search.name, kind.signature),
                 search=search,
                 kind=kind,
-                repeat=repeat_command(run, search, kind),
                 task=task,
                 found=as_found if task.sha256 != as_found.sha256 else None,
             )
@@ -232,7 +230,7 @@ def _facts(plan: KindPlan) -> tuple[Fact, ...]:
     means = grade_in_words(severity.grade) if severity and severity.grade else ""
     least, _, least_text = kind.least.partition(": ")
     is_told = shows_shrunk or kind.severest == plan.task.name
-    seen = in_control_text(kind.in_control, search.random_flights)
+    seen = kind.seen_in_control
     flights = f"{kind.count} of {search.flown} flights"
     return (
         (label, f"{text} ({means})" if text and means else text),
@@ -255,7 +253,7 @@ def _status(saved: SavedCase) -> str:
 
 
 def _commands(plan: KindPlan) -> tuple[Fact, ...]:
-    commands = [("the first flight, as found", plan.repeat)]
+    commands = [("the first flight, as found", plan.kind.repeat)]
     if plan.saved is not None:
         file = shown_file(plan.saved.path)
         commands.insert(0, ("the saved case", command("garl", "cases", "replay", file)))

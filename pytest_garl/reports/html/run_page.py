@@ -17,18 +17,11 @@ from pytest_garl.reports.run_record import (
 from pytest_garl.reports.run_text import (
     LEGEND,
     PAPER_DEFINITION,
-    counted_causes,
     counts_text,
-    director_text,
-    event_director_text,
-    in_control_text,
-    kinds_lines,
     limits_text,
-    movers_text,
-    origins_text,
     percent,
-    strikes_text,
 )
+from pytest_garl.reports.sentences import counted_causes
 
 MOST_THUMBNAILS = 24
 """So that the index stays below 300 kB: a small picture takes some 6 kB."""
@@ -79,7 +72,7 @@ def title(run: RunRecord) -> str:
     if not run.violating:
         return f"{who}: no violation in {run.flown} flights"
     ways = "one way" if len(run.kinds) == 1 else f"{len(run.kinds)} ways"
-    causes = counted_causes(run.kinds)
+    causes = counted_causes([kind.cause for kind in run.kinds])
     with_causes = f", {causes}" if causes else ""
     return (
         f"{who}: {run.violating} of {run.flown} flights violate something, in {ways}{with_causes}"
@@ -159,8 +152,8 @@ def figures(search: SearchRecord) -> list[Fact]:
             ),
             ("time to the touchdown", f"median {time_s.median:.1f} s, worst {time_s.worst:.1f} s"),
         ]
-    if search.origins:
-        found.append(("how scenarios were made", origins_text(search)))
+    told = search.told
+    found.append(("how scenarios were made", told.get("origins", "")))
     if search.model is not None:
         found.append(
             (
@@ -169,12 +162,12 @@ def figures(search: SearchRecord) -> list[Fact]:
                 "the mean of earlier flights",
             )
         )
-    if search.movers is not None:
-        found.append(("who moved the NPCs", movers_text(search)))
-    if search.director is not None:
-        found.append(("how good the director of NPCs was", director_text(search)))
-    found.append(("who let events strike", strikes_text(search)))
-    found.append(("how good the director of events was", event_director_text(search)))
+    found += [
+        ("who moved the NPCs", told.get("movers", "")),
+        ("how good the director of NPCs was", told.get("director", "")),
+        ("who let events strike", told.get("strikes", "")),
+        ("how good the director of events was", told.get("event director", "")),
+    ]
     return [figure for figure in found if figure[1]]
 
 
@@ -225,7 +218,7 @@ def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
     kind, search, case = plan.kind, plan.search, plan.case
     facts = [
         kind.least,
-        in_control_text(kind.in_control, search.random_flights),
+        kind.seen_in_control,
         case.robustness if case else "",
         case.prevention.text.partition(":")[0] if case else "",
     ]
@@ -245,7 +238,7 @@ def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
 
 def control_rows(run: RunRecord) -> list[Fact]:
     """Return how diverse the kinds of each search are, and what random flights found beside it."""
-    return [(search.name, text) for search in run.searches for text in kinds_lines(search)]
+    return [(search.name, text) for search in run.searches for text in search.remarks]
 
 
 def archive_rows(run: RunRecord) -> list[tuple[str, str, list[tuple[int, int]]]]:
