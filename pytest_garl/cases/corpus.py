@@ -25,14 +25,16 @@ from pytest_garl.scenarios.maps.loading import load_map
 class CorpusEntry:
     """One file of the corpus.
 
-    ``header`` is enough to collect tests.  Each part of the file is read when it is asked for.
+    Its header is enough to collect tests.  The rest is read when it is asked for.
     """
 
     path: Path
     changed_ns: int
     map_folders: tuple[Path, ...]
-    lost: str = ""
-    """Why there is no file; empty if there is one."""
+    header: CaseHeader | None
+    """The facts above the first table, or None if something is wrong with them."""
+    header_problem: str = ""
+    """What is wrong with them, or why there is no file."""
 
     @property
     def name(self) -> str:
@@ -49,25 +51,10 @@ class CorpusEntry:
         """The problem of the file, with source, key and expected value; empty for a good file."""
         return self._content[1]
 
-    @property
-    def header(self) -> CaseHeader | None:
-        """The facts above the first table, or None if something is wrong with them."""
-        return self._head[0]
-
-    @functools.cached_property
-    def _head(self) -> tuple[CaseHeader | None, str]:
-        if self.lost:
-            return None, self.lost
-        try:
-            return load_header(self.path), ""
-        except ScenarioError as error:
-            return None, str(error)
-
     @functools.cached_property
     def _content(self) -> tuple[Case | None, str]:
-        header, problem = self._head
-        if header is None:
-            return None, problem
+        if self.header is None:
+            return None, self.header_problem
         try:
             return load_case(self.path, self.map_folders), ""
         except ScenarioError as error:
@@ -204,6 +191,8 @@ class Corpus:
         return self._listed[folder]
 
     def _list(self, folder: Path) -> Iterator[CorpusEntry]:
+        if folder.is_symlink() and not folder.exists():
+            yield _lost(folder, "there is no such folder")
         # Since Python 3.13 glob raises for a name that no folder can have, such as one with a NUL.
         for path in sorted(folder.glob("[!.]*.toml")) if folder.is_dir() else ():
             try:
@@ -214,14 +203,17 @@ class Corpus:
                 # Else another process removed it after it was listed.
                 continue
             yield self._read(path, changed_ns)
-        if folder.is_symlink() and not folder.exists():
-            yield _lost(folder, "there is no such folder")
 
     def _read(self, path: Path, changed_ns: int) -> CorpusEntry:
         known = self._entries.get(path)
         if known is None or known.changed_ns != changed_ns:
+            header, problem = _header_of(path)
             known = self._entries[path] = CorpusEntry(
-                path=path, changed_ns=changed_ns, map_folders=self.map_folders
+                path=path,
+                changed_ns=changed_ns,
+                map_folders=self.map_folders,
+                header=header,
+                header_problem=problem,
             )
         return known
 
@@ -267,13 +259,23 @@ def patch_of(path: Path, root: Path, text: str) -> str:
     return f"diff --git a/{name} b/{name}\nnew file mode 100644\n{''.join(body)}"
 
 
+def _header_of(path: Path) -> tuple[CaseHeader | None, str]:
+    """Return the header of a file, or None and what is wrong with it."""
+    try:
+        return load_header(path), ""
+    except ScenarioError as error:
+        return None, str(error)
+
+
 def _lost(path: Path, reason: str) -> CorpusEntry:
     """Return an entry for a symbolic link without a file: a case may be lost."""
     problem = (
         f"{path}: cannot be read: found a symbolic link that leads nowhere ({reason}), expected "
         "a file; remove it, or restore what it points to"
     )
-    return CorpusEntry(path=path, changed_ns=0, map_folders=(), lost=printable(problem))
+    return CorpusEntry(
+        path=path, changed_ns=0, map_folders=(), header=None, header_problem=printable(problem)
+    )
 
 
 def _failure(case: Case) -> tuple[object, ...]:
