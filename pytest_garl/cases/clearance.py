@@ -78,13 +78,6 @@ def escaped(flight: Flight, world: World, from_s: float, until_s: float) -> bool
     return _along(flight, from_s, until_s, Clearance(world).holds)
 
 
-def touched_nothing(flight: Flight, until_s: float) -> bool:
-    """Return whether a flight hit no body up to a time; it may have landed."""
-    return not any(
-        contact.time_s <= until_s and contact.body_class != "ground" for contact in flight.contacts
-    )
-
-
 def poses_at(flight: Flight, index: int) -> list[ObjectPose]:
     """Return where the moving bodies are in a sample of the tracks."""
     found: list[ObjectPose] = []

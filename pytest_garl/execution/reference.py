@@ -47,18 +47,6 @@ HASHED = (
     "verdicts",
 )
 """Folders and modules of this package that shape a search: its hash covers them."""
-NOT_HASHED = (
-    "__init__.py",
-    "cases",
-    "cli",
-    "errors.py",
-    "gate",
-    "messages.py",
-    "plugin",
-    "reports",
-    "testing.py",
-)
-"""Folders and modules of this package that start searches or show their results."""
 HASHED_SUFFIXES = (".hpp", ".npz", ".obj", ".py", ".toml")
 """Files of weights, of meshes, of sources and of maps."""
 

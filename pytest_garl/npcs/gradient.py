@@ -14,28 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pytest_garl.npcs.learned import Array, Network
 
 Layers = tuple[tuple[Array, Array], ...]
-Numbers = NDArray[np.int64]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Decisions:
-    """Decisions and what followed, one in a row: what a network learns from.
-
-    ``states`` and ``afters`` (n, inputs) are the inputs at a decision and at the next one,
-    ``actions`` (n,) what was chosen, ``rewards`` (n,) what that was worth, and ``goes_on`` (n,) the
-    discount of what follows, 0 if nothing does.
-    """
-
-    states: Array
-    actions: Numbers
-    rewards: Array
-    afters: Array
-    goes_on: Array
 
 
 def untrained(state: str, sizes: Sequence[int], seed: int) -> Network:

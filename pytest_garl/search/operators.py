@@ -48,16 +48,6 @@ def farthest_from_all(candidates: Matrix, values: Matrix) -> int:
     return int(np.argmax(np.abs(candidates[:, None] - values[None, :]).sum(axis=1)))
 
 
-def farthest_from_nearest(candidates: Matrix, values: Matrix) -> int:
-    """Index of the candidate (n, d) whose nearest of ``values`` (m, d) is farthest away.
-
-    Mitchell's best candidate (1991, "Spectrally optimal sampling for distribution ray tracing").
-    Points drawn in this way, one after another, fill the range evenly.
-    """
-    apart = np.linalg.norm(candidates[:, None] - values[None, :], axis=2)
-    return int(np.argmax(apart.min(axis=1)))
-
-
 def property_mutation(
     offspring: Matrix,
     lower: Matrix,
@@ -81,29 +71,3 @@ def property_mutation(
                 drawn = rng.uniform(lower[column], upper[column], candidates)
                 mutated[row, column] = drawn[farthest_from_all(drawn, mutated[:, column])]
     return mutated
-
-
-LEAST_STEP, LARGEST_STEP = 0.003, 0.3
-"""Standard deviations of a local step, as shares of the property's range."""
-
-
-def local_steps(
-    offspring: Matrix,
-    lower: Matrix,
-    upper: Matrix,
-    rng: np.random.Generator,
-    *,
-    probability: float = MUTATION_PROBABILITY,
-    largest: float = LARGEST_STEP,
-) -> Matrix:
-    """Return a copy in which each property moves a little with ``probability``, at least one.
-
-    The size of the steps is drawn for each chromosome, log-uniformly up to ``largest``, because a
-    collision may depend on centimetres.
-    """
-    rows, columns = offspring.shape
-    scale = np.exp(rng.uniform(np.log(LEAST_STEP), np.log(largest), (rows, 1)))
-    moves = rng.random(offspring.shape) < probability
-    moves[np.arange(rows), rng.integers(columns, size=rows)] = True
-    steps = rng.normal(0.0, 1.0, offspring.shape) * scale * (upper - lower)
-    return np.clip(np.where(moves, offspring + steps, offspring), lower, upper)

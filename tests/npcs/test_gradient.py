@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from pytest_garl.npcs.gradient import (
     Adam,
     Layers,
-    Numbers,
     Stopping,
     StoppingRate,
     _backwards,
@@ -40,7 +40,7 @@ def values_of(layers: Layers, states: Array) -> Array:
 
 
 def loss_and_gradient(
-    layers: Layers, states: Array, actions: Numbers, expected: Array
+    layers: Layers, states: Array, actions: NDArray[np.int64], expected: Array
 ) -> tuple[float, Layers]:
     """Return the mean Huber loss of the chosen actions' values, and its gradient.
 

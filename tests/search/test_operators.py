@@ -7,8 +7,6 @@ from hypothesis import strategies as st
 
 from pytest_garl.search.operators import (
     farthest_from_all,
-    farthest_from_nearest,
-    local_steps,
     nuclear_gene_crossover,
     property_mutation,
 )
@@ -47,25 +45,6 @@ def test_crossover_happens_at_the_stated_rate() -> None:
 def test_paper_candidate_rule_takes_the_largest_sum_of_distances() -> None:
     # Sums to {0, 0.2, 1}: 0.5 -> 1.3; 0.9 -> 1.7; 0.1 -> 1.1.
     assert farthest_from_all(np.array([0.5, 0.9, 0.1]), np.array([0.0, 0.2, 1.0])) == 1
-
-
-def test_farthest_from_nearest_takes_the_candidate_in_the_largest_gap() -> None:
-    values = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
-    candidates = np.array([[0.1, 0.1], [0.5, 0.4], [1.0, 0.8], [0.0, 0.5]])
-    assert farthest_from_nearest(candidates, values) == 1
-
-
-def test_local_steps_have_all_sizes_and_move_every_chromosome() -> None:
-    lower, upper = np.full(5, -1.0), np.full(5, 1.0)
-    parents = np.zeros((2000, 5))
-    moved = local_steps(parents, lower, upper, np.random.default_rng(5))
-    sizes = np.abs(moved - parents).max(axis=1)
-    assert (sizes > 0).all()
-    assert (np.abs(moved) <= 1).all()
-    # One of five properties always moves, the other four with probability 0.2 each.
-    assert (moved != parents).mean() == pytest.approx(0.2 + 0.8 * 0.2, abs=0.02)
-    assert (sizes < 0.02).mean() > 0.2
-    assert (sizes > 0.1).mean() > 0.15
 
 
 def test_mutation_keeps_every_property_in_its_range() -> None:

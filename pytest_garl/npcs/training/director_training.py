@@ -2,7 +2,7 @@
 
 A table knows how the landing ends for each moment, and so what each decision is worth: learning
 follows the gradient of the expected worth itself, without samples, exploration or bootstrapping.
-It needs no torch and starts from the best rule.  Double Q-learning on the same tables is a rival.
+It needs no torch and starts from the best rule.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import numpy as np
 
 from pytest_garl.npcs.director import WAITING, Director, LearnedDirector, TimeToGo
 from pytest_garl.npcs.gradient import (
-    Decisions,
     Stopping,
     StoppingRate,
     learned_when_to_go,
@@ -30,13 +29,11 @@ from pytest_garl.npcs.training.checkpoint import sources_sha256
 from pytest_garl.npcs.training.counterfactuals import (
     COLLIDED,
     PREVENTABLE,
-    STRIDE,
     WORTH,
     MomentTable,
     drawn_table,
 )
-from pytest_garl.npcs.training.dqn import Learner, one_thread
-from pytest_garl.npcs.training.presets import Surrogate, Training
+from pytest_garl.npcs.training.presets import Surrogate
 from pytest_garl.npcs.training.selection import (
     CHOICE_SEEDS_FROM,
     REPORT_SEEDS_FROM,
@@ -68,32 +65,6 @@ def score_of(director: Director, tables: Sequence[MomentTable]) -> MomentScore:
     )
 
 
-def decisions_of(tables: Sequence[MomentTable]) -> Decisions:
-    """Return every decision of tables: to wait at each, and to go where the end is known."""
-    states, actions, rewards, afters, goes_on = [], [], [], [], []
-    for table in tables:
-        last = len(table.features) - 1
-        for number, row in enumerate(table.features):
-            states.append(row)
-            actions.append(0)
-            rewards.append(WORTH.get(table.end_of(None), 0.0) if number == last else 0.0)
-            afters.append(row if number == last else table.features[number + 1])
-            goes_on.append(0.0 if number == last else 1.0)
-            if number % STRIDE == 0:
-                states.append(row)
-                actions.append(1)
-                rewards.append(WORTH.get(table.end_of(number), 0.0))
-                afters.append(row)
-                goes_on.append(0.0)
-    return Decisions(
-        states=np.array(states),
-        actions=np.array(actions, dtype=np.int64),
-        rewards=np.array(rewards),
-        afters=np.array(afters),
-        goes_on=np.array(goes_on),
-    )
-
-
 def stopping_of(table: MomentTable) -> Stopping:
     """Return a table as what each decision is worth."""
     numbers = range(len(table.features))
@@ -121,25 +92,6 @@ def train_network(tables: Sequence[MomentTable], settings: StoppingRate, seed: i
     network = untrained(WAITING, (inputs, *HIDDEN, actions), seed)
     things = [stopping_of(table) for table in tables]
     return learned_when_to_go(network, things, np.array(goes), settings)
-
-
-def deep_q_network(tables: Sequence[MomentTable], training: Training) -> Network:
-    """Return a network that double Q-learning in torch trained on tables: a rival."""
-    rows = decisions_of(tables)
-    count = len(rows.actions)
-    with one_thread():
-        learner = Learner(*SHAPES[WAITING], dataclasses.replace(training, replay=count))
-        for index in range(count):
-            learner.remember(
-                rows.states[index].astype(np.float32),
-                int(rows.actions[index]),
-                float(rows.rewards[index]),
-                rows.afters[index].astype(np.float32),
-                float(rows.goes_on[index]),
-            )
-        for _ in range(training.updates * count):
-            learner.update()
-        return learner.policy(WAITING)
 
 
 def tables_of(

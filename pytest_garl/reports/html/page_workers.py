@@ -19,8 +19,6 @@ from pytest_garl.reports.html.flight_task import FlightTask, ShownFlight, shown_
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
-START_S = 1.0
-"""A process takes so long to start as two or three flights without a film take to draw."""
 
 
 def cores() -> int:

@@ -20,12 +20,9 @@ from pytest_garl.npcs.training.counterfactuals import MomentTable
 from pytest_garl.npcs.training.director_training import (
     begin_of,
     best_rule,
-    decisions_of,
-    deep_q_network,
     score_of,
     train_network,
 )
-from pytest_garl.npcs.training.presets import Training
 
 NAN = float("nan")
 
@@ -75,29 +72,12 @@ def test_a_director_is_judged_on_a_table_without_a_flight() -> None:
     assert score_of(Below(1.0), tables).rate == 0.0
 
 
-def test_a_table_is_all_decisions_at_once() -> None:
-    rows = decisions_of([table(0)])
-    waits, goes = rows.actions == 0, rows.actions == 1
-    assert (waits.sum(), goes.sum()) == (12, 6)
-    assert rows.goes_on[waits].tolist() == [1.0] * 11 + [0.0]
-    assert not rows.goes_on[goes].any()
-    assert rows.rewards[goes].tolist() == [0, 1, 1, 0, 0, 0]
-    assert (rows.afters[waits][:-1] == rows.states[waits][1:]).all()
-
-
 def test_a_network_learns_when_to_go_from_the_best_rule_on() -> None:
     tables = [table(seed) for seed in range(4)]
     rule = best_rule(tables)
     assert score_of(rule, tables).preventable == 4
     assert 0.0 <= rule.margin_s <= 2.0
     network = train_network(tables, StoppingRate(imitates=40, steps=100, learning_rate=1e-2), 0)
-    assert score_of(LearnedDirector(network=network), tables).preventable == 4
-
-
-def test_deep_q_learning_learns_it_too() -> None:
-    tables = [table(seed) for seed in range(4)]
-    training = Training(updates=8, discount=1.0, warm_up=1, target_every=50, learning_rate=5e-3)
-    network = deep_q_network(tables, training)
     assert score_of(LearnedDirector(network=network), tables).preventable == 4
 
 
