@@ -40,6 +40,7 @@ HASHED = (
     "npcs",
     "process_tree.py",
     "program.py",
+    "program_process.py",
     "scenarios",
     "search",
     "simulation",
