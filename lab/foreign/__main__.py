@@ -52,8 +52,8 @@ def main() -> None:
     for foreign in SYSTEMS:
         if foreign.name not in chosen:
             continue
-        if foreign.repository.problem:
-            print(f"| {foreign.name} | | | not flown: {foreign.repository.problem} | | | |")
+        if foreign.problem:
+            print(f"| {foreign.name} | | | not flown: {foreign.problem} | | | |")
             continue
         for map_name in MAPS:
             for off_m in OFF_M:

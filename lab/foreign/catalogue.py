@@ -11,11 +11,21 @@ from pathlib import Path
 from typing import Any
 
 from lab.foreign.repository import Changes, Repository, clones
-from pytest_garl import Airframe, ArduCopter, Camera, CompanionProgram, Rangefinder, Start
+from pytest_garl import (
+    Airframe,
+    ArduCopter,
+    Camera,
+    CompanionProgram,
+    ExternalProgram,
+    Rangefinder,
+    Start,
+    external,
+)
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.task import Task
 
 HERE = str(Path(__file__).parent)
+CLIENTS = str(Path(external.__file__).with_name("clients"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,9 +33,16 @@ class Foreign:
     """One landing system of somebody else, and the task that it is given."""
 
     name: str
-    system: CompanionProgram
+    system: CompanionProgram | ExternalProgram
     repository: Repository
     task: Task
+    python: Path
+
+    @property
+    def problem(self) -> str:
+        """What is missing to fly it; empty if nothing is."""
+        no_python = f"{self.python}: no such file; docs/foreign-systems.md says what it needs"
+        return self.repository.problem or ("" if self.python.is_file() else no_python)
 
 
 def adapted(
@@ -40,17 +57,39 @@ def adapted(
     **vehicle: Any,
 ) -> Foreign:
     """Return a foreign system: a program of its clone, in the Python beside the clones."""
+    python = clones() / "venv/bin/python"
     system = CompanionProgram(
         command,
         name=name.replace("-", "_"),
         folder=repository.prepared(changes or {}),
-        python=clones() / "venv/bin/python",
+        python=python,
         windows="ignore",
         environment=environment,
         **vehicle,
     )
     task = Task(marker=marker, start=start or Start())
-    return Foreign(name=name, system=system, repository=repository, task=task)
+    return Foreign(name=name, system=system, repository=repository, task=task, python=python)
+
+
+def over_ros(
+    name: str,
+    repository: Repository,
+    *nodes: str,
+    camera: Camera,
+    marker: MarkerSpec,
+    start: Start,
+) -> Foreign:
+    """Return nodes of ROS 2 as a foreign system, with ``px4_face.py`` as their vehicle."""
+    python = clones() / "ros/bin/python"
+    system = ExternalProgram(
+        [str(python), f"{HERE}/px4_face.py", *nodes],
+        name=name.replace("-", "_"),
+        folder=repository.prepared({}),
+        airframe=Airframe(camera=camera),
+        environment={"PYTHONPATH": f"{CLIENTS}:{HERE}"},
+    )
+    task = Task(marker=marker, start=start)
+    return Foreign(name=name, system=system, repository=repository, task=task, python=python)
 
 
 def calibration(camera: Camera, name: str = "") -> dict[str, str]:
@@ -70,6 +109,8 @@ WEBCAM = Camera(width_px=640, height_px=480)
 PI_CAMERA = Camera(width_px=640, height_px=480, field_of_view_rad=math.radians(62.2))
 PHONE = Camera(width_px=640, height_px=480, field_of_view_rad=1.1252)
 """That of the calibration in the repository, without its distortion."""
+SQUARE = Camera(width_px=480, height_px=480, field_of_view_rad=2 * math.atan(0.5), rate_hz=20)
+"""Its focal length is its width, which the node takes for granted."""
 SIYI = Camera(width_px=640, height_px=360, field_of_view_rad=math.radians(81))
 
 SYSTEMS = (
@@ -171,5 +212,19 @@ SYSTEMS = (
         vehicle=ArduCopter(pilot="LAND", parameters={"PLND_ENABLED": 1}),
         marker=MarkerSpec(dictionary="DICT_6X6_250", id=23, side_m=0.5),
         changes={"camera2.py": {"MARKER_SIZE = 0.20": "MARKER_SIZE = 0.50"}},
+    ),
+    over_ros(
+        "kyujin-precision-land",
+        Repository(
+            name="kyujin1/ArUco-Marker-Precision-Landing-and-Hovering",
+            commit="98d42f3e486e1dbe3939d187054b53dfe0250f61",
+            licence="none",
+            paths=("vtol/vtol/cam_node.py", "vtol/vtol/precision_land.py"),
+        ),
+        "vtol/vtol/cam_node.py",
+        "vtol/vtol/precision_land.py",
+        camera=SQUARE,
+        marker=MarkerSpec(dictionary="DICT_6X6_250", id=1, side_m=1.5),
+        start=Start(mode="hover", height_m=10.0),
     ),
 )

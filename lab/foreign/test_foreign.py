@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 
 from lab.foreign.catalogue import SYSTEMS
-from pytest_garl import Landing
+from pytest_garl import CompanionProgram, Landing
 
 
 class _Landings:
@@ -34,9 +34,13 @@ class _Landings:
 def _marks(name: str) -> tuple[bool, pytest.MarkDecorator]:
     """Return whether the system's code is there, and how it is flown."""
     foreign = next(each for each in SYSTEMS if each.name == name)
-    task = foreign.task
-    return not foreign.repository.problem, pytest.mark.garl(
-        system=foreign.system, maps=["court", "lawn"], marker=task.marker, start=task.start
+    task, is_exact = foreign.task, isinstance(foreign.system, CompanionProgram)
+    return not foreign.problem, pytest.mark.garl(
+        system=foreign.system,
+        maps=["court", "lawn"],
+        marker=task.marker,
+        start=task.start,
+        deterministic=is_exact,
     )
 
 
@@ -68,3 +72,9 @@ class TestPandyaCamera2(_Landings):
     """The landing target messages of "Pandya16"."""
 
     __test__, pytestmark = _marks("pandya-camera2")
+
+
+class TestKyujinPrecisionLand(_Landings):
+    """The two nodes of ROS 2 of "kyujin1"."""
+
+    __test__, pytestmark = _marks("kyujin-precision-land")

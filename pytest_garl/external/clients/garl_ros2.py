@@ -42,7 +42,7 @@ def main(words: list[str]) -> None:
         raise SystemExit(__doc__)
     link = garl_client.Link(frame="ENU", reads=["image"])
     # Two flights at a time must not hear each other.
-    _choose_domain()
+    choose_domain()
     node = subprocess.Popen(words, stdin=subprocess.DEVNULL)
     bridge = _Bridge(link.mission, node, speed_mps)
     for seen in link:
@@ -51,7 +51,7 @@ def main(words: list[str]) -> None:
     node.terminate()
 
 
-def _choose_domain() -> None:
+def choose_domain() -> None:
     """Take a ROS domain that no other flight of this machine has, until this process ends."""
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     for domain in range(1, DOMAINS + 1):
