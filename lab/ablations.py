@@ -8,7 +8,6 @@ take seconds.  ``python -m lab.ablations`` flies the searches that ``docs/ablati
 from __future__ import annotations
 
 import argparse
-import functools
 import itertools
 import json
 import os
@@ -23,14 +22,12 @@ from scipy.stats import t
 
 from lab.arms import arm_named
 from lab.stand_in import stand_in
-from lab.stand_in_model import StandInModel, perturbed
-from lab.stand_in_way import ORDINARY, STURDY, LandingModel
+from lab.stand_in_way import ORDINARY, STURDY
 from lab.table import Key, ResultTable, Row
 from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.maps.loading import load_map
-from pytest_garl.search.method import FlownScenario, Method, SearchPlan
-from pytest_garl.search.methods.garl import Garl, GarlParameters
+from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.verdicts.kinds import hill_number
 
 MAPS = ("court", "lawn")
@@ -47,21 +44,8 @@ TABLE = ResultTable(
 )
 
 
-ALMOST_RIGHT, RIGHT = "model 30 % off", "right model"
-VARIANTS = ("garl", "exploring+", "shuffled", "random", ALMOST_RIGHT, RIGHT)
-"""The arms that are flown, and what evolution would be worth with a better model: a copy of the
-stand-in, all of whose constants are up to 30 % off, and the stand-in itself.  Rows of an older
-commit have other names."""
-PERTURBED = 0.3
-
-
-def make(name: str, plan: SearchPlan, landing: LandingModel) -> Method:
-    """Start a search of a variant."""
-    if name not in (ALMOST_RIGHT, RIGHT):
-        return arm_named(name).make(plan)
-    by = PERTURBED if name == ALMOST_RIGHT else 0.0
-    model = functools.partial(StandInModel, plan, perturbed(by, plan.seed), landing)
-    return Garl(plan, GarlParameters(model=model))
+VARIANTS = ("garl", "exploring+", "shuffled", "random")
+"""The arms that are flown."""
 
 
 def search(key: Key, pool: Executor) -> dict[str, Any]:
@@ -75,7 +59,7 @@ def run_search(key: Key) -> dict[str, Any]:
     map = load_map(map_name)
     genome = genome_of(domain_named("field"), map)
     plan = SearchPlan(map=map, genome=genome, seed=int(seed), population=POPULATION)
-    method, found = make(name, plan, LANDINGS[landing]), list[str]()
+    method, found = arm_named(name).make(plan), list[str]()
     for _ in range(BUDGET // POPULATION):
         scenarios = method.ask()
         results = [stand_in(each, map, LANDINGS[landing]) for each in scenarios]

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import csv
 import dataclasses
 import json
 import re
@@ -58,24 +57,6 @@ def test_the_page_of_experiments_tells_every_column_and_every_key() -> None:
     assert [name for name in columns if f"`{name}`" not in text] == []
     told = {name.strip("[]") for name in re.findall(r"`([a-z_\[\]]+)`", text)}
     assert told >= TOP_KEYS
-
-
-def test_counts_in_remarks_agree_with_the_rows() -> None:
-    from lab.experiment.results import read_rows
-
-    rows = {row.result_hash: row for row in read_rows(DOCS / "experiments" / "rq.csv")}
-    with (DOCS / "experiments" / "counts.csv").open(newline="") as file:
-        lines = list(csv.DictReader(file))
-    assert lines
-    for line in lines:
-        row = rows[line["result_hash"]]
-        kinds = dict(each.split("=") for each in line["kinds"].split("|") if each)
-        assert (row.system, row.map, row.method) == (line["system"], line["map"], line["method"])
-        assert tuple(kinds) == row.signatures
-        assert tuple(map(int, kinds.values())) == row.counts
-        assert sum(map(int, kinds.values())) == row.violations
-        assert int(line["aborted"]) == row.aborted
-        assert row.violations + row.aborted + int(line["landed"]) == row.budget
 
 
 @pytest.mark.long

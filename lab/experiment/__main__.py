@@ -35,7 +35,7 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.option(
     "--out",
     type=_FOLDER,
-    help="Folder for rows, report and pictures, instead of the place that FILE names.",
+    help="Folder for rows and report, instead of the place that FILE names.",
 )
 @click.option(
     "--folder",
@@ -118,7 +118,7 @@ class _ProgressDisplay:
             top10 = row.top10 or "not reached"
             self._print(
                 Text(
-                    f"    {row.map}: {row.landings} of {row.budget} landed, {row.violations} "
+                    f"    {row.map}: {row.landed} of {row.budget} landed, {row.violations} "
                     f"violate, {len(row.signatures)} kinds, Top-10 {top10}"
                 )
             )

@@ -18,13 +18,14 @@ from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.flight.flight_file import load
+from pytest_garl.gate.compatibility import limits_text
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.groups import WEATHER
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.paper_metrics import empty_cells, mark_visited, mean_distance, top_k
-from pytest_garl.verdicts.verdict import Limits, Verdict
+from pytest_garl.verdicts.verdict import Verdict
 
 HASH_DIGITS = 12
 """Number of digits of a hash in a row."""
@@ -91,8 +92,6 @@ def result_row(
         method=run.method,
         seed=run.seed,
         budget=run.budget,
-        unavoidable=None,
-        piloted=None,
         workers=workers,
         machine=cpu_class_of_flights(),
         result_hash=ledger.queries.result_hash(search.key)[:HASH_DIGITS],
@@ -123,11 +122,6 @@ def _violations(search: FinishedSearch) -> dict[str, Any]:
         "signatures": tuple(sorted(kinds)),
         "kind_counts": tuple(kinds[name] for name in sorted(kinds)),
     }
-
-
-def limits_text(limits: Limits) -> str:
-    """Return the limits by which a row counts violations, as a table shows them."""
-    return f"{limits.distance_m:g} m, {limits.time_s:g} s, abort {limits.abort}"
 
 
 def _diversity(search: FinishedSearch, domain: str) -> dict[str, Any]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from lab.experiment.results import ResultRow
-from lab.experiment.spec import Experiment, Grid, Published
+from lab.experiment.spec import Experiment, Grid
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +29,7 @@ VIOLATIONS = Metric(
 )
 PAPER = Metric(
     title="paper's definition, %",
-    value_of=lambda row: 100 * row.paper_violations / row.budget,
+    value_of=lambda row: 100 * row.paper / row.budget,
     digits=1,
 )
 TOP10 = Metric(title="Top-10, flights", value_of=_top10, digits=0)
@@ -38,8 +38,6 @@ COVERAGE = Metric(title="coverage, %", value_of=lambda row: 100 * row.covered / 
 CAUSES = Metric(title="causes", value_of=lambda row: len(row.causes), digits=1)
 KINDS = Metric(title="kinds", value_of=lambda row: len(row.signatures), digits=1)
 METRICS = (VIOLATIONS, PAPER, TOP10, DISTANCE, COVERAGE, CAUSES)
-OLD = "old"
-"""The definition of a row of version 0.1, which does not name its limits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,14 +54,13 @@ class MethodSearches:
         """The seeds that were flown."""
         return tuple(row.seed for row in self.rows)
 
-    def values(self, metric: Metric, seeds: Iterable[int] | None = None) -> list[float]:
-        """Return the metric of each search, or of those with these seeds."""
-        wanted = self.seeds if seeds is None else set(seeds)
-        return [metric.value_of(row) for row in self.rows if row.seed in wanted]
+    def values(self, metric: Metric) -> list[float]:
+        """Return the metric of each search."""
+        return [metric.value_of(row) for row in self.rows]
 
-    def mean(self, metric: Metric, seeds: Iterable[int] | None = None) -> float:
+    def mean(self, metric: Metric) -> float:
         """Return the mean of the metric over searches."""
-        return statistics.fmean(self.values(metric, seeds))
+        return statistics.fmean(self.values(metric))
 
     @property
     def hours(self) -> float:
@@ -74,8 +71,8 @@ class MethodSearches:
 
     @property
     def definitions(self) -> tuple[str, ...]:
-        """The definitions by which the rows count violations: their limits, or :data:`OLD`."""
-        return tuple(sorted({row.limits or OLD for row in self.rows}))
+        """The limits by which the rows count violations."""
+        return tuple(sorted({row.limits for row in self.rows}))
 
     @property
     def all_causes(self) -> int:
@@ -89,49 +86,30 @@ class MethodSearches:
 
     @property
     def kind_counts(self) -> list[tuple[int, ...]]:
-        """The violations of each kind, of each search whose row tells them."""
-        return [row.counts for row in self.rows if row.counts is not None]
+        """The violations of each kind, of each search."""
+        return [row.kind_counts for row in self.rows]
 
-    def sum_of(self, count_of: Callable[[ResultRow], int | None]) -> int | None:
-        """Return the sum of a count over all searches; None if a row does not hold it."""
-        counts = [count_of(row) for row in self.rows]
-        return None if None in counts else sum(count or 0 for count in counts)
-
-
-def searches_of_method(
-    experiment: Experiment,
-    rows: Sequence[ResultRow],
-    seeds: Iterable[int],
-    system: str,
-    map: str,
-    method: str,
-) -> MethodSearches:
-    """Return the rows of a method for a system on a map that belong to an experiment."""
-    keys = {(system, map, method, seed, experiment.budget) for seed in seeds}
-    own = sorted((row for row in rows if row.key in keys), key=lambda row: row.seed)
-    return MethodSearches(system=system, map=map, method=method, rows=tuple(own))
+    def sum_of(self, count_of: Callable[[ResultRow], int]) -> int:
+        """Return the sum of a count over all searches."""
+        return sum(map(count_of, self.rows))
 
 
 def searches_in_grid(
     experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]
 ) -> list[MethodSearches]:
     """Return the searches of each map, system and method of a grid, also of those without rows."""
+    wanted = sorted(
+        (row for row in rows if row.seed in grid.seeds and row.budget == experiment.budget),
+        key=lambda row: row.seed,
+    )
     return [
-        searches_of_method(experiment, rows, grid.seeds, system, map, method)
+        MethodSearches(
+            system=system,
+            map=map,
+            method=method,
+            rows=tuple(row for row in wanted if row.key[:3] == (system, map, method)),
+        )
         for map in grid.maps
         for system in grid.systems
         for method in grid.methods
     ]
-
-
-def published_for(experiment: Experiment, searches: MethodSearches) -> Published | None:
-    """Return the published figures for the system, map and method of the searches."""
-    return next(
-        (
-            each
-            for each in experiment.published
-            if (each.system, each.map) == (searches.system, searches.map)
-            and searches.method in each.methods
-        ),
-        None,
-    )

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from lab.experiment import goals, tables
+from lab.experiment import tables
 from lab.experiment.campaign import missing_runs
 from lab.experiment.metrics import searches_in_grid
-from lab.experiment.plots import draw_grid
 from lab.experiment.results import ResultRow
 from lab.experiment.spec import Experiment, ExperimentRun, Grid
 from pytest_garl.files.atomic import write_text_atomically
@@ -19,21 +16,19 @@ from pytest_garl.verdicts.paper_metrics import CELL_M, HEIGHT_M
 
 HOW_TO_READ = f"""\
 - *Landed*: within the limit of distance from the marker's centre.
-- *Violations* are counted by the limits in the column *definition*. "Old" marks rows of version
-  0.1: a violation is a collision, a landing more than 1.5 m from the marker, or no landing in
-  120 s, and a flight that gives up is none. Top-10, violating scenarios, coverage, causes,
-  kinds and types are of the same violations. Rows of different definitions are not compared.
+- *Violations* are counted by the limits in the column *definition*. Top-10, violating scenarios,
+  coverage, causes, kinds and types are of the same violations. Rows of different definitions are
+  not compared.
 - *Paper's definition*: a collision, a crash, or no landing within 1.5 m of the marker; each flight
-  that gives up counts, because the paper's type II is "no landing occurs". Old rows tell this too.
+  that gives up counts, because the paper's type II is "no landing occurs".
 - *Gave up*: flights that the landing system gave up, for whatever reason. *Blocked*, *excused* and
   *needless* share out the flights that were given up or ran out of time: the marker was never free
-  for long enough, it could not be read for long enough, or neither. – if the rows do not tell.
+  for long enough, it could not be read for long enough, or neither.
 - Behind the mean, brackets hold the figure of each seed. There are no intervals: the flights of a
   search that learns are no independent sample.
 - *Top-10*: flights until the tenth violation, one figure per seed; – if there were fewer than
   ten. In comparisons and means such a search counts as the budget plus one.
-- *Hours*: of one search on its workers, idle time included. After "+" the training of the
-  policy, which is done once for all searches.
+- *Hours*: of one search on its workers, idle time included.
 - *Parameter distance*: the mean Euclidean distance between all scenarios of a search (the paper's
   equation), over every gene that all methods have, normalised to [0, 1]; the same for the violating
   scenarios alone; and that of the eight weather genes, not normalised. The paper's code measured
@@ -48,10 +43,7 @@ HOW_TO_READ = f"""\
 - *Kinds at equal violations*: how many kinds the given number of violations shows on average if it
   is drawn from those of a search (rarefaction). The number is that of the search with the fewest
   violations for this system and map, but at least {tables.LEAST_VIOLATIONS}; – for a search with
-  fewer. – also stands for a row that does not tell how often each kind occurred.
-- *Paper*: the paper's figure for its method of this name; its simulator, maps and landing systems
-  are different. Its shares, Top-10, coverage and types of violations do not stand here, because its
-  violations are of another definition.
+  fewer.
 - *A12* (Vargha and Delaney): how often a search of the first method has the larger figure; 0.5
   means no difference. *p*: exact two-sided Mann-Whitney test over the seeds. Three seeds against
   three cannot reach p below 0.10. *p by Holm* counts all comparisons of effective kinds that the
@@ -61,7 +53,7 @@ HOW_TO_READ = f"""\
 def write_report(
     experiment: Experiment, rows: Sequence[ResultRow], source: str, path: Path
 ) -> Path:
-    """Write the report to ``path``, and pictures beside it; ``source`` names the rows' file."""
+    """Write the report to ``path``; ``source`` names the rows' file."""
     sections = [
         f"# {experiment.title}",
         "<!-- Written by "
@@ -72,17 +64,7 @@ def write_report(
         *_flown(experiment, rows),
     ]
     for grid in experiment.grids:
-        sections += _grid(experiment, grid, rows, path)
-    if experiment.goals is not None:
-        found = goals.goal_results(experiment, experiment.goals, rows)
-        sections += [
-            f"## Goals of {experiment.goals.method} on {experiment.goals.system}",
-            "The figures are means over seeds. Two methods are compared on the seeds that both\n"
-            f"have flown. If {experiment.goals.method} flew more seeds, brackets hold its mean "
-            "over the common ones.",
-            goals.table(found, experiment.goals.method),
-            experiment.goals.remarks,
-        ]
+        sections += _grid(experiment, grid, rows)
     sections += ["## How to read the tables", HOW_TO_READ]
     return write_text_atomically(path, "\n\n".join(part for part in sections if part) + "\n")
 
@@ -144,11 +126,7 @@ def _policy(row: ResultRow) -> str:
     return f"{row.policy} {row.policy_sha256}".strip()
 
 
-def _grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: Path) -> list[str]:
-    slug = re.sub(r"[^a-z0-9]+", "-", f"{experiment.file.stem}-{grid.name}".lower())
-    picture = path.parent / "pictures" / f"{slug}.png"
-    drawn = draw_grid(experiment, grid, rows, picture)
-    compared = tables.comparison(experiment, grid, rows)
+def _grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> list[str]:
     return [
         f"## {grid.title}",
         grid.text,
@@ -156,12 +134,7 @@ def _grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: P
         tables.diversity(experiment, grid, rows),
         "Types of violations, as shares of all violations of types I to V:",
         tables.violation_types(experiment, grid, rows),
-        f"![{grid.title}]({os.path.relpath(picture, path.parent)})" if drawn else "",
-        "Points are searches, boxes span the quartiles, whiskers all searches. Violations are\n"
-        "counted as in the table."
-        if drawn
-        else "",
-        compared,
+        tables.comparison(experiment, grid, rows),
         tables.comparison_of_kinds(experiment, grid, rows),
         grid.remarks,
     ]

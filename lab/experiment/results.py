@@ -29,12 +29,7 @@ class ResultRow:
     """The results of one search: a system on a map, a method, a seed, a budget.
 
     ``docs/experiments/README.md`` explains each column.  None stands for a value that does not
-    exist, such as a tenth violation after only nine.  ``limits`` says what counts as a violation in
-    the row.  It is empty in a row of version 0.1, in which a violation was a collision, no landing
-    within the time limit, or a landing more than 1.5 m from the marker, and a flight that gave up
-    was none.  ``kind_counts`` has the violations of each of the ``signatures``, and is empty in a
-    row that does not tell them.  ``unavoidable`` and ``piloted`` are void: the pilot that they tell
-    of, flown without eyes, "avoided" as much.
+    exist, such as a tenth violation after only nine.
     """
 
     system: str
@@ -53,8 +48,6 @@ class ResultRow:
     hard: int
     aborted: int
     inconclusive: int
-    unavoidable: int | None
-    piloted: int | None
     top10: int | None
     signatures: tuple[str, ...]
     parameter_distance: float
@@ -74,14 +67,14 @@ class ResultRow:
     package_sha256: str
     machine: str
     result_hash: str
-    limits: str = ""
-    landed: int | None = None
-    paper: int | None = None
-    slid: int | None = None
-    blocked: int | None = None
-    excused: int | None = None
-    needless: int | None = None
-    kind_counts: tuple[int, ...] = ()
+    limits: str
+    landed: int
+    paper: int
+    slid: int
+    blocked: int
+    excused: int
+    needless: int
+    kind_counts: tuple[int, ...]
 
     @property
     def key(self) -> tuple[str, str, str, int, int]:
@@ -94,32 +87,9 @@ class ResultRow:
         return self.type_i, self.type_ii, self.type_iii, self.type_iv, self.type_v
 
     @property
-    def landings(self) -> int:
-        """Flights that landed within the limit of distance; in a row of version 0.1 all others."""
-        if self.landed is not None:
-            return self.landed
-        return self.budget - self.paper_violations - self.inconclusive
-
-    @property
-    def paper_violations(self) -> int:
-        """Violations by the paper's definition: collisions, crashes, no landing within 1.5 m.
-
-        A row of version 0.1 counts the flights without landing apart, those that gave up and those
-        whose landing system crashed.
-        """
-        return (
-            self.paper if self.paper is not None else self.violations + self.aborted + self.type_v
-        )
-
-    @property
     def causes(self) -> tuple[str, ...]:
         """The distinct types and causes of violations: signatures without phase and sight."""
         return tuple(sorted({cause_of(each) for each in self.signatures}))
-
-    @property
-    def counts(self) -> tuple[int, ...] | None:
-        """The violations of each kind, in the order of ``signatures``; None if nobody knows."""
-        return self.kind_counts if len(self.kind_counts) == len(self.signatures) else None
 
 
 def _number(cell: str) -> float:
@@ -162,10 +132,6 @@ _EXPECTED = {
     "tuple[int,": "whole numbers from 0",
 }
 _FIELDS = {field.name: str(field.type) for field in dataclasses.fields(ResultRow)}
-_FIRST_FIELDS = tuple(
-    field.name for field in dataclasses.fields(ResultRow) if field.default is dataclasses.MISSING
-)
-"""The columns of a file that version 0.1 wrote; the next added row adds the others, empty."""
 
 
 def read_rows(path: Path) -> tuple[ResultRow, ...]:
@@ -180,7 +146,7 @@ def read_rows(path: Path) -> tuple[ResultRow, ...]:
     lines = csv.DictReader(io.StringIO(text, newline=""), strict=True)
     try:
         _check_columns(path, lines.fieldnames or ())
-        return tuple(_row(path, lines.line_num, cells, lines.fieldnames or ()) for cells in lines)
+        return tuple(_row(path, lines.line_num, cells) for cells in lines)
     except csv.Error as error:
         raise ExperimentError(
             f"{path}, line {lines.line_num + 1}: not valid CSV: {error}"
@@ -188,8 +154,7 @@ def read_rows(path: Path) -> tuple[ResultRow, ...]:
 
 
 def _check_columns(path: Path, found: Sequence[str]) -> None:
-    # New columns stand at the end.
-    if len(found) < len(_FIRST_FIELDS) or tuple(found) != tuple(_FIELDS)[: len(found)]:
+    if tuple(found) != tuple(_FIELDS):
         wrong = {*found} ^ {*_FIELDS}
         raise ExperimentError(
             f"{path}: found other columns than expected"
@@ -198,27 +163,25 @@ def _check_columns(path: Path, found: Sequence[str]) -> None:
         )
 
 
-def _row(
-    path: Path, line: int, cells: Mapping[str, str | None], columns: Sequence[str]
-) -> ResultRow:
+def _row(path: Path, line: int, cells: Mapping[str, str | None]) -> ResultRow:
     values = {}
-    for name in columns:
+    for name, kind in _FIELDS.items():
         cell = cells[name]
-        if cell is None or len(cells) > len(columns):
+        if cell is None or len(cells) > len(_FIELDS):
             raise ExperimentError(
                 f"{path}, line {line}: found too {'few' if cell is None else 'many'} cells, "
-                f"expected {len(columns)}"
+                f"expected {len(_FIELDS)}"
             )
         try:
-            values[name] = _READERS[_FIELDS[name]](cell)
+            values[name] = _READERS[kind](cell)
         except ValueError as error:
-            expected = _EXPECTED[_FIELDS[name].partition(" ")[0]]
+            expected = _EXPECTED[kind.partition(" ")[0]]
             raise ExperimentError(
                 f"{path}, line {line}: column {name!r}: found {shown(cell)}, expected {expected}"
             ) from error
     row = ResultRow(**values)
     counts = row.kind_counts
-    if counts and (len(counts) != len(row.signatures) or sum(counts) != row.violations):
+    if len(counts) != len(row.signatures) or sum(counts) != row.violations:
         raise ExperimentError(
             f"{path}, line {line}: column 'kind_counts': found {_cell(counts)}, expected "
             f"{len(row.signatures)} numbers, one for each signature, {row.violations} in all"

@@ -21,21 +21,7 @@ _MOST_FLIGHTS = 1_000_000
 WITH = " with "
 """Separates a search method and an NPC policy."""
 PAPER_TYPES = ("I", "II", "III", "IV", "V")
-TOP_KEYS = frozenset(
-    {
-        "title",
-        "text",
-        "report",
-        "budget",
-        "seeds",
-        "maps",
-        "systems",
-        "grids",
-        "goals",
-        "training_hours",
-        "published",
-    }
-)
+TOP_KEYS = frozenset({"title", "text", "report", "budget", "seeds", "maps", "systems", "grids"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,40 +81,8 @@ class Grid:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Published:
-    """Published figures for a system on a map, shown beside those of ``methods``.
-
-    ``distance`` is the mean distance between the scenarios' weather genes, ``hours`` the duration
-    of a search.  None means not published.  Figures that count violations have no place here: those
-    of others are of another definition.
-    """
-
-    system: str
-    map: str
-    methods: tuple[str, ...]
-    distance: float | None
-    hours: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Goals:
-    """The methods that goals compare: ``method`` with random search and with the baselines."""
-
-    system: str
-    method: str
-    random: str
-    baselines: tuple[str, ...]
-    maps: tuple[str, ...]
-    seeds: tuple[int, ...]
-    remarks: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Experiment:
-    """An experiment, as specified in its file.
-
-    ``training_h`` is the time of training a method's policy, in hours, before any search.
-    """
+    """An experiment, as specified in its file."""
 
     file: Path
     rows: Path
@@ -138,9 +92,6 @@ class Experiment:
     budget: int
     systems: Mapping[str, str]
     grids: tuple[Grid, ...]
-    goals: Goals | None
-    training_h: Mapping[str, float]
-    published: tuple[Published, ...]
 
     @property
     def runs(self) -> tuple[ExperimentRun, ...]:
@@ -183,7 +134,6 @@ def read_experiment(file: Path) -> Experiment:
     )
     if searches > _MOST_SEARCHES:
         raise top.error("grids", f"found {searches} searches, expected at most {_MOST_SEARCHES}")
-    training = top.table("training_hours") if "training_hours" in top.values else None
     return Experiment(
         file=file,
         rows=file.with_suffix(".csv"),
@@ -193,11 +143,6 @@ def read_experiment(file: Path) -> Experiment:
         budget=top.integer("budget", low=1, high=_MOST_FLIGHTS),
         systems=names,
         grids=grids,
-        goals=_goals(top.table("goals"), grids) if "goals" in top.values else None,
-        training_h={key: training.number(key, low=0.0) for key in training.values}
-        if training
-        else {},
-        published=tuple(_published(each, names) for each in top.tables("published")),
     )
 
 
@@ -247,31 +192,3 @@ def _seeds(table: Table) -> tuple[int, ...]:
             "seeds", f"found {shown(found)}, expected whole numbers from 0, each once"
         )
     return tuple(found)
-
-
-def _goals(table: Table, grids: Collection[Grid]) -> Goals:
-    table.refuse_unknown({"grid", "system", "method", "random", "baselines", "remarks"})
-    name = table.string("grid", allowed=[grid.name for grid in grids])
-    grid = next(grid for grid in grids if grid.name == name)
-    methods = grid.methods
-    return Goals(
-        system=table.string("system", allowed=grid.systems),
-        method=table.string("method", allowed=methods),
-        random=table.string("random", allowed=methods),
-        baselines=_some(table, "baselines", allowed=methods),
-        maps=grid.maps,
-        seeds=grid.seeds,
-        remarks=table.string("remarks", "").strip(),
-    )
-
-
-def _published(table: Table, systems: Collection[str]) -> Published:
-    figures = ("distance", "hours")
-    table.refuse_unknown({"system", "map", "methods", *figures})
-    values = {key: table.number(key, low=0.0) if key in table.values else None for key in figures}
-    return Published(
-        system=table.string("system", allowed=systems),
-        map=table.string("map"),
-        methods=_some(table, "methods"),
-        **values,
-    )

@@ -15,7 +15,6 @@ from lab.experiment.metrics import (
     VIOLATIONS,
     MethodSearches,
     Metric,
-    published_for,
     searches_in_grid,
 )
 from lab.experiment.results import ResultRow
@@ -38,14 +37,14 @@ def markdown(header: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
 
 def _table(
     header: Sequence[str],
-    cells_of: Callable[[Experiment, MethodSearches], Sequence[str]],
+    cells_of: Callable[[MethodSearches], Sequence[str]],
     experiment: Experiment,
     grid: Grid,
     rows: Sequence[ResultRow],
 ) -> str:
     """Return a table with a line per map, system and method of a grid."""
     lines = [
-        [each.map, each.system, each.method, *cells_of(experiment, each)]
+        [each.map, each.system, each.method, *cells_of(each)]
         for each in searches_in_grid(experiment, grid, rows)
     ]
     return markdown(("map", "system", "method", *header), lines)
@@ -65,20 +64,16 @@ def effect(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str
         "definition",
         "Top-10",
         "hours",
-        "paper",
     )
     return _table(header, _effect_cells, experiment, grid, rows)
 
 
-def _effect_cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
-    paper = published_for(experiment, searches)
-    their_hours = _number(paper.hours if paper else None, 0)
+def _effect_cells(searches: MethodSearches) -> list[str]:
     if not searches.rows:
-        return [NOT_RUN, *[NONE] * 10, their_hours]
-    training = experiment.training_h.get(searches.method, 0.0)
+        return [NOT_RUN, *[NONE] * 10]
     return [
         _numbers(searches.seeds),
-        _share(searches, lambda row: row.landings),
+        _share(searches, lambda row: row.landed),
         _mean_and_values(searches, VIOLATIONS),
         _mean_and_values(searches, PAPER),
         _share(searches, lambda row: row.aborted),
@@ -87,8 +82,7 @@ def _effect_cells(experiment: Experiment, searches: MethodSearches) -> list[str]
         _share(searches, lambda row: row.needless),
         " / ".join(searches.definitions),
         ", ".join(NONE if row.top10 is None else str(row.top10) for row in searches.rows),
-        f"{searches.hours:.2f}" + (f" + {training:.2f}" if training else ""),
-        their_hours,
+        f"{searches.hours:.2f}",
     ]
 
 
@@ -105,7 +99,6 @@ def diversity(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> 
         "parameter distance",
         "of violating ones",
         "of weather alone",
-        "paper",
         "coverage, %",
         "causes",
         "kinds",
@@ -114,18 +107,16 @@ def diversity(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> 
     )
     equal = equal_violations(searches_in_grid(experiment, grid, rows))
 
-    def cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
+    def cells(searches: MethodSearches) -> list[str]:
         drawn = equal.get((searches.system, searches.map))
-        return [*_diversity_cells(experiment, searches), _rarefied(searches, drawn)]
+        return [*_diversity_cells(searches), _rarefied(searches, drawn)]
 
     return _table(header, cells, experiment, grid, rows)
 
 
-def _diversity_cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
-    paper = published_for(experiment, searches)
-    distance = _number(paper.distance if paper else None, 2)
+def _diversity_cells(searches: MethodSearches) -> list[str]:
     if not searches.rows:
-        return [NOT_RUN, NONE, NONE, distance, *[NONE] * 4]
+        return [NOT_RUN, *[NONE] * 6]
     violating = [
         row.violating_distance for row in searches.rows if row.violating_distance is not None
     ]
@@ -134,7 +125,6 @@ def _diversity_cells(experiment: Experiment, searches: MethodSearches) -> list[s
         f"{searches.mean(DISTANCE):.2f}",
         f"{sum(violating) / len(violating):.2f}" if violating else NONE,
         f"{sum(weather) / len(weather):.3f}",
-        distance,
         f"{searches.mean(COVERAGE):.2f}",
         _distinct(searches, CAUSES, searches.all_causes),
         _distinct(searches, KINDS, searches.all_kinds),
@@ -143,7 +133,7 @@ def _diversity_cells(experiment: Experiment, searches: MethodSearches) -> list[s
 
 
 def effective_kinds(searches: MethodSearches) -> list[float]:
-    """Return the Hill number of order 1 of each search whose row tells the counts.
+    """Return the Hill number of order 1 of each search.
 
     All searches of an experiment have one budget, so that these are at equal flights.
     """
@@ -171,16 +161,13 @@ def _rarefied(searches: MethodSearches, drawn: int | None) -> str:
     def kinds(counts: Sequence[int]) -> float | None:
         return kinds_in_violations(counts, drawn) if sum(counts) >= drawn else None
 
-    text = _of_kinds(searches, kinds)
-    return text if text == NONE else f"{text} in {drawn}"
+    return f"{_of_kinds(searches, kinds)} in {drawn}" if searches.rows else NONE
 
 
 def _of_kinds(searches: MethodSearches, figure_of: Callable[[Sequence[int]], float | None]) -> str:
-    """Return a figure of the kinds of each search; one dash if no row tells them."""
-    if not searches.kind_counts:
-        return NONE
-    figures = [None if row.counts is None else figure_of(row.counts) for row in searches.rows]
-    return ", ".join(_number(figure, 1) for figure in figures)
+    """Return a figure of the kinds of each search."""
+    figures = map(figure_of, searches.kind_counts)
+    return ", ".join(NONE if figure is None else f"{figure:.1f}" for figure in figures)
 
 
 def _distinct(searches: MethodSearches, metric: Metric, in_all: int) -> str:
@@ -202,7 +189,7 @@ def violation_types(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow
     return _table(header, _violation_type_cells, experiment, grid, rows)
 
 
-def _violation_type_cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
+def _violation_type_cells(searches: MethodSearches) -> list[str]:
     if not searches.rows:
         return [NOT_RUN, *[NONE] * 6]
     counts = [
@@ -213,7 +200,7 @@ def _violation_type_cells(experiment: Experiment, searches: MethodSearches) -> l
         " / ".join(f"{100 * count / total:.0f}" for count in counts) if total else NONE,
         str(total),
         *(
-            _count(searches.sum_of(of))
+            str(searches.sum_of(of))
             for of in (
                 lambda row: row.late,
                 lambda row: row.off,
@@ -243,12 +230,11 @@ def comparison(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) ->
 def comparison_of_kinds(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:
     """Return the same of the effective kinds, with p by Holm over all comparisons of a system.
 
-    A row that does not tell the counts is left out; two of each are needed.
+    Two seeds of each are needed.
     """
     pairs = [
         (one, other, effective_kinds(one), effective_kinds(other))
         for one, other in _pairs(experiment, grid, rows)
-        if min(len(one.kind_counts), len(other.kind_counts)) >= 2
     ]
     p_values = [mann_whitney(first, second)[1] for _, _, first, second in pairs]
     adjusted = [0.0] * len(pairs)
@@ -306,16 +292,6 @@ def _numbers(values: Iterable[int]) -> str:
     return ", ".join(str(value) for value in values)
 
 
-def _number(value: float | None, digits: int) -> str:
-    return NONE if value is None else f"{value:.{digits}f}"
-
-
-def _share(searches: MethodSearches, count_of: Callable[[ResultRow], int | None]) -> str:
-    """Return the percentage of flights; NONE if a row does not hold the count."""
-    count = searches.sum_of(count_of)
-    flights = sum(row.budget for row in searches.rows)
-    return NONE if count is None else f"{100 * count / flights:.1f}"
-
-
-def _count(count: int | None) -> str:
-    return NONE if count is None else str(count)
+def _share(searches: MethodSearches, count_of: Callable[[ResultRow], int]) -> str:
+    """Return the percentage of flights."""
+    return f"{100 * searches.sum_of(count_of) / searches.sum_of(lambda row: row.budget):.1f}"

@@ -248,7 +248,13 @@ def _use(ledger: Ledger) -> None:
 
 
 def _rows() -> list[str]:
-    text = rows._dumps([row(), row(seed=2, top10=None), row(map="lawn", signatures=())])
+    text = rows._dumps(
+        [
+            row(),
+            row(seed=2, top10=None),
+            row(map="lawn", violations=0, signatures=(), kind_counts=()),
+        ]
+    )
     return [text]
 
 

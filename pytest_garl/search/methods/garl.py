@@ -82,10 +82,6 @@ class GarlParameters:
     shuffled: bool = False
     """Whether the model is fitted to results that are exchanged among the flights: a placebo, which
     has the same machinery and knows nothing."""
-    model: Callable[[Columns, Matrix, Matrix, Matrix, Matrix], MarginModel] = MarginModel
-    """What predicts the margins of children, fitted to the flights."""
-    exploration: Callable[[Columns, Map], Exploration] = Exploration
-    """What draws scenarios without parents."""
 
 
 EXPLORING = GarlParameters(bred_share=0.0)
@@ -106,7 +102,7 @@ class Garl:
             np.random.default_rng(each) for each in (seeds, seeds.spawn(1)[0])
         )
         self._columns = Columns(plan.genome)
-        self._exploration = self._parameters.exploration(self._columns, plan.map)
+        self._exploration = Exploration(self._columns, plan.map)
         self._strata = Bandit()
         self._choices: dict[str, str] = {}
         """The stratum of each scenario, by its text; empty for those that no stratum made."""
@@ -215,7 +211,7 @@ class Garl:
         if self._parameters.shuffled:
             order = rng.permutation(len(rows))
             proximity, violates, rarity = proximity[order], violates[order], rarity[order]
-        model = self._parameters.model(self._columns, rows, proximity, violates, rarity)
+        model = MarginModel(self._columns, rows, proximity, violates, rarity)
         brood = Evolution(self._columns, self._exploration, model, rows, rng).candidates()
         if not len(brood):
             return

@@ -23,8 +23,6 @@ PLAIN: dict[str, Any] = {
     "hard": 0,
     "aborted": 4,
     "inconclusive": 0,
-    "unavoidable": None,
-    "piloted": None,
     "top10": 30,
     "signatures": ("II:lost:descent", "IV:dog:last-metre:seen"),
     "parameter_distance": 1.5,
@@ -53,17 +51,6 @@ PLAIN: dict[str, Any] = {
     "needless": 2,
     "kind_counts": (4, 6),
 }
-OF_VERSION_0_1: dict[str, Any] = {
-    "limits": "",
-    "landed": None,
-    "paper": None,
-    "slid": None,
-    "blocked": None,
-    "excused": None,
-    "needless": None,
-    "kind_counts": (),
-}
-"""What a row of version 0.1 does not tell."""
 
 
 def row(**values: Any) -> ResultRow:

@@ -7,7 +7,7 @@ import pytest
 
 from lab.experiment.results import append_rows, read_rows
 from pytest_garl.errors import ExperimentError
-from tests.lab.experiment.samples import OF_VERSION_0_1, PLAIN, row
+from tests.lab.experiment.samples import PLAIN, row
 
 BARE = row(seed=1, violations=0, top10=None, signatures=(), kind_counts=(), violating_distance=None)
 
@@ -25,45 +25,13 @@ def test_read_returns_appended_rows(tmp_path: Path) -> None:
     assert read_rows(path) == (row(), BARE)
     head, first, second = path.read_text().splitlines()
     assert head.split(",") == list(PLAIN)
-    assert first.startswith("Lander,court,garl,0,40,10,1,2,0,6,1,3,1,0,4,0,,,30,II:lost:descent|")
-    assert ",,,,,1.5000,0.1250,," in second
-
-
-def test_a_file_of_version_0_1_is_read_and_gains_columns(tmp_path: Path) -> None:
-    path = tmp_path / "rows.csv"
-    old = row(**OF_VERSION_0_1, unavoidable=1, piloted=4)
-    append_rows(path, [old])
-    narrow = [line.split(",")[: -len(OF_VERSION_0_1)] for line in path.read_text().splitlines()]
-    path.write_text("".join(f"{','.join(cells)}\n" for cells in narrow))
-    assert narrow[0][-1] == "result_hash"
-    assert read_rows(path) == (old,)
-    append_rows(path, [BARE])
-    assert read_rows(path) == (old, BARE)
-    assert path.read_text().splitlines()[1] == ",".join([*narrow[1], *[""] * len(OF_VERSION_0_1)])
-
-
-def test_a_row_of_version_0_1_counts_flights_without_landing_by_the_papers_definition() -> None:
-    old = row(**OF_VERSION_0_1, violations=10, aborted=4, type_v=1, inconclusive=2)
-    assert (old.paper_violations, old.landings) == (15, 23)
-    assert (row().paper_violations, row().landings) == (12, 26)
+    assert first.startswith("Lander,court,garl,0,40,10,1,2,0,6,1,3,1,0,4,0,30,II:lost:descent|")
+    assert ",,,1.5000,0.1250,," in second
 
 
 def test_causes_leave_out_phase_and_sight() -> None:
     found = row(signatures=("IV:dog:descent:seen", "IV:dog:last-metre:unseen", "off:seen"))
     assert found.causes == ("IV:dog", "off:seen")
-
-
-def test_a_row_without_counts_of_its_kinds_does_not_tell_them() -> None:
-    assert row().counts == (4, 6)
-    assert row(kind_counts=()).counts is None
-    assert BARE.counts == ()
-
-
-def test_a_file_without_the_last_column_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "rows.csv"
-    append_rows(path, [row()])
-    path.write_text(path.read_text().replace(",kind_counts", "").replace(",4|6\n", "\n"))
-    assert read_rows(path) == (row(kind_counts=()),)
 
 
 def test_a_search_has_one_row(tmp_path: Path) -> None:
@@ -99,8 +67,8 @@ def test_simultaneous_appends_lose_no_row(tmp_path: Path) -> None:
             "line 2: column 'violations': found 'ten', expected a whole number",
         ),
         (",1.5000,", ",nan,", "column 'parameter_distance': found 'nan', expected a number"),
-        (",4|6", "", "line 2: found too few cells, expected 45"),
-        (",eeeeeeeeeeee", ",e,e", "line 2: found too many cells, expected 45"),
+        (",4|6", "", "line 2: found too few cells, expected 43"),
+        (",eeeeeeeeeeee", ",e,e", "line 2: found too many cells, expected 43"),
         (",4|6", ",4|-6", "column 'kind_counts': found '4|-6', expected whole numbers from 0"),
         (",4|6", ",4|5", "'kind_counts': found 4|5, expected 2 numbers, one for each signature"),
         (",4|6", ",10", "'kind_counts': found 10, expected 2 numbers, one for each signature, 10"),

@@ -40,10 +40,8 @@ def test_a_toy_experiment_is_flown_measured_and_reported(tmp_path: Path) -> None
         # Whoever violates was somewhere.
         assert (row.covered > 0) == (row.violations > 0) == bool(row.signatures)
         assert row.limits
-        assert row.counts is not None
-        assert sum(row.counts) == row.violations
-        assert row.landings + row.paper_violations <= row.budget
+        assert sum(row.kind_counts) == row.violations
+        assert row.landed + row.paper <= row.budget
     experiment("--report")
     text = (tmp_path / "smoke.md").read_text()
     assert "Toy: 4 of 4 searches of 3 flights" in text
-    assert (tmp_path / "pictures" / "smoke-toy.png").is_file()

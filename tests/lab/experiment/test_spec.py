@@ -29,22 +29,6 @@ name = "RQ2"
 systems = ["Two"]
 maps = ["lawn"]
 methods = ["garl", "ga"]
-
-[goals]
-grid = "RQ2"
-system = "Two"
-method = "garl"
-random = "ga"
-baselines = ["ga"]
-
-[training_hours]
-garl = 0.5
-
-[[published]]
-system = "Two"
-map = "lawn"
-methods = ["garl"]
-hours = 12
 """
 
 
@@ -116,16 +100,6 @@ def test_rows_and_report_lie_beside_the_spec(tmp_path: Path) -> None:
     assert plan(tmp_path, 'report = "../r.md"\n' + TEXT).report == tmp_path.parent / "r.md"
 
 
-def test_missing_keys_have_defaults(tmp_path: Path) -> None:
-    found = plan(tmp_path)
-    assert found.training_h == {"garl": 0.5}
-    (theirs,) = found.published
-    assert (theirs.hours, theirs.distance) == (12, None)
-    assert found.goals is not None
-    assert (found.goals.maps, found.goals.seeds) == (("lawn",), (3, 4))
-    assert plan(tmp_path, TEXT.partition("[goals]")[0]).goals is None
-
-
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
@@ -147,11 +121,6 @@ def test_missing_keys_have_defaults(tmp_path: Path) -> None:
         ('"test_one.py"', "1", "'systems.One': found 1, expected a string"),
         ("One =", '"a/b" =', "'systems.a/b': expected a name of letters, digits"),
         ('name = "RQ2"', 'name = "RQ1"', "'grids': found RQ1 twice, expected each name once"),
-        ('grid = "RQ2"', 'grid = "RQ3"', "'goals.grid': found 'RQ3', expected one of RQ1, RQ2"),
-        ('random = "ga"', 'random = "x"', "'goals.random': found 'x', expected one of ga, garl"),
-        ('system = "Two"\nmethod', 'system = "One"\nmethod', "'goals.system': found 'One'"),
-        ("garl = 0.5", "garl = -1", "'training_hours.garl': found -1, expected a number from 0"),
-        ("hours = 12", "violations = 17.11", "'published[0].violations': unknown key; expected"),
         ("budget = 40", "budget = 40\nunavoidable = 2", "'unavoidable': unknown key; expected one"),
         ('title = "Mine"', "title = ", "not valid TOML"),
     ],
@@ -174,17 +143,3 @@ def test_a_spec_without_grids_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("file", sorted(DOCS.glob("*.toml")), ids=lambda file: file.stem)
 def test_every_shipped_experiment_can_be_flown(file: Path) -> None:
     check_experiment(read_experiment(file), DOCS.parents[1])
-
-
-def test_the_shipped_experiment_asks_the_papers_questions() -> None:
-    found = read_experiment(DOCS / "rq.toml")
-    first, second, third = found.grids
-    assert [len(first.systems), len(first.maps), first.methods] == [3, 2, ("garl", "garl-paper")]
-    assert second.systems == ("MM-MLS",)
-    assert len(second.methods) == 7
-    assert third.methods == ("garl", "random with dqn", "garl with waypoint", "random")
-    assert found.report.resolve() == DOCS.parent / "experiments.md"
-    named = {(each.system, each.map, name) for each in found.published for name in each.methods}
-    for map in second.maps:
-        assert {("MM-MLS", map, method) for method in second.methods} <= named
-    assert all((DOCS.parents[1] / tests).is_file() for tests in found.systems.values())
