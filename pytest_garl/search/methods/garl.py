@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -35,7 +35,6 @@ from pytest_garl.execution.flight_id import Slot
 from pytest_garl.execution.result import Origin
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.files import dump_scenario
-from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.bandit import Bandit
