@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from lab.experiment.measure import finished_searches, result_row
 from lab.experiment.pytest_run import run_pytest
@@ -17,7 +16,6 @@ from lab.experiment.results import ResultRow, append_rows, read_rows
 from lab.experiment.spec import Experiment, ExperimentRun
 from pytest_garl.errors import ExperimentError, GarlError
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.files.atomic import locked
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.maps.loading import load_map
@@ -31,19 +29,6 @@ class CampaignFolders:
     rows: Path
     runs: Path
     root: Path
-
-
-class CampaignObserver(Protocol):
-    """Receives the progress of a campaign."""
-
-    def on_run_begin(self, run: ExperimentRun, number: int, total: int) -> None:
-        """Take note of a new run: ``number`` of ``total``, earlier finished runs included."""
-
-    def on_flights(self, searches: Sequence[SearchProgress]) -> None:
-        """Take note of the progress of a run; called often."""
-
-    def on_run_end(self, rows: Sequence[ResultRow]) -> None:
-        """Take note of the saved rows of a run."""
 
 
 def missing_runs(experiment: Experiment, known: Sequence[ResultRow]) -> tuple[ExperimentRun, ...]:
@@ -97,9 +82,9 @@ def _maps(root: Path) -> Path:
 
 
 def fly_experiment(
-    experiment: Experiment, folders: CampaignFolders, workers: int, observer: CampaignObserver
+    experiment: Experiment, folders: CampaignFolders, workers: int, tell: Callable[[str], None]
 ) -> None:
-    """Fly all missing runs; the rows of a run are saved as soon as it is finished."""
+    """Fly all missing runs, and tell of each; its rows are saved as soon as it is finished."""
     check_experiment(experiment, folders.root)
     total = len(experiment.runs)
     left = missing_runs(experiment, read_rows(folders.rows))
@@ -107,13 +92,17 @@ def fly_experiment(
         _tidy(folders.runs / run.folder)
     for number, run in enumerate(left, start=total - len(left) + 1):
         folder = folders.runs / run.folder
-        observer.on_run_begin(run, number, total)
+        tell(f"run {number} of {total}: {run.title}")
         # Wait for another process that flies the same run.
         with locked(folder):
             if run in missing_runs(experiment, read_rows(folders.rows)):
-                rows = _fly_run(run, folder, workers, observer)
+                rows = _fly_run(run, folder, workers)
                 append_rows(folders.rows, rows)
-                observer.on_run_end(rows)
+                for row in rows:
+                    tell(
+                        f"    {row.map}: {row.landed} of {row.budget} landed, {row.violations} "
+                        f"violate, {len(row.signatures)} kinds, Top-10 {row.top10 or 'not reached'}"
+                    )
             _tidy(folder)
 
 
@@ -122,10 +111,8 @@ def _tidy(folder: Path) -> None:
     shutil.rmtree(folder / "flights", ignore_errors=True)
 
 
-def _fly_run(
-    run: ExperimentRun, folder: Path, workers: int, observer: CampaignObserver
-) -> list[ResultRow]:
-    with closing(Ledger(run_pytest(run, folder, workers, observer.on_flights))) as ledger:
+def _fly_run(run: ExperimentRun, folder: Path, workers: int) -> list[ResultRow]:
+    with closing(Ledger(run_pytest(run, folder, workers))) as ledger:
         return [
             result_row(run, each, ledger, workers=workers)
             for each in finished_searches(run, ledger)

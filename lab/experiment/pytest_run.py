@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import IO
@@ -16,36 +16,24 @@ from typing import IO
 from lab.experiment.spec import ExperimentRun
 from pytest_garl.errors import ExperimentError, LedgerError
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.execution.processes import end_with_parent
 
-PROGRESS_EVERY_S = 0.5
-"""Time between two looks at the ledger of a running session."""
 LAST_LINES = 15
 """Number of lines of a failed session's output in the error."""
 _SEARCHED = (0, 1)
 """Exit statuses of a completed session: 1 means failing tests, that is, violations."""
 
 
-def run_pytest(
-    run: ExperimentRun,
-    folder: Path,
-    workers: int,
-    on_progress: Callable[[Sequence[SearchProgress]], None],
-) -> Path:
+def run_pytest(run: ExperimentRun, folder: Path, workers: int) -> Path:
     """Fly the searches of a run, or continue them; return the path of the ledger.
 
-    ``folder`` takes the ledger, the flights and the session's output.  ``on_progress`` is called
-    with the progress of the searches.  After a KeyboardInterrupt the session ends in order before
-    the exception is raised again.
+    ``folder`` takes the ledger, the flights and the session's output, which shows its progress.
+    After a KeyboardInterrupt the session ends in order before the exception is raised again.
     """
     ledger, log = folder / "ledger.sqlite", folder / "pytest.log"
     folder.mkdir(parents=True, exist_ok=True)
     with log.open("wb") as output, _session(_command(run, folder, workers), output) as session:
-        while session.poll() is None:
-            on_progress(_progress(ledger))
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                session.wait(PROGRESS_EVERY_S)
+        session.wait()
     if session.returncode not in _SEARCHED:
         lines = log.read_text(errors="replace").strip().splitlines()
         raise ExperimentError(
@@ -116,11 +104,3 @@ def _has_ledger(ledger: Path) -> bool:
     with contextlib.suppress(LedgerError), closing(Ledger(ledger)) as opened:
         return opened.facts.ledger_version is not None
     return False
-
-
-def _progress(ledger: Path) -> Sequence[SearchProgress]:
-    """Return the progress of the searches; empty until the ledger exists."""
-    if ledger.is_file():
-        with contextlib.suppress(LedgerError), closing(Ledger(ledger)) as opened:
-            return opened.queries.progress()
-    return ()

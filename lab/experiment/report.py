@@ -17,7 +17,7 @@ from pytest_garl.verdicts.paper_metrics import CELL_M, HEIGHT_M
 HOW_TO_READ = f"""\
 - *Landed*: within the limit of distance from the marker's centre.
 - *Violations* are counted by the limits in the column *definition*. Top-10, violating scenarios,
-  coverage, causes, kinds and types are of the same violations. Rows of different definitions are
+  coverage, causes and kinds are of the same violations. Rows of different definitions are
   not compared.
 - *Paper's definition*: a collision, a crash, or no landing within 1.5 m of the marker; each flight
   that gives up counts, because the paper's type II is "no landing occurs".
@@ -132,8 +132,6 @@ def _grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> list
         grid.text,
         tables.effect(experiment, grid, rows),
         tables.diversity(experiment, grid, rows),
-        "Types of violations, as shares of all violations of types I to V:",
-        tables.violation_types(experiment, grid, rows),
         tables.comparison(experiment, grid, rows),
         tables.comparison_of_kinds(experiment, grid, rows),
         grid.remarks,

@@ -18,7 +18,7 @@ from lab.experiment.metrics import (
     searches_in_grid,
 )
 from lab.experiment.results import ResultRow
-from lab.experiment.spec import PAPER_TYPES, Experiment, Grid
+from lab.experiment.spec import Experiment, Grid
 from pytest_garl.gate.gate_statistics import holm_adjusted
 from pytest_garl.verdicts.kinds import hill_number, kinds_in_violations
 from pytest_garl.verdicts.statistics import mann_whitney, vargha_delaney
@@ -173,43 +173,6 @@ def _of_kinds(searches: MethodSearches, figure_of: Callable[[Sequence[int]], flo
 def _distinct(searches: MethodSearches, metric: Metric, in_all: int) -> str:
     counts = [int(count) for count in searches.values(metric)]
     return _numbers(counts) + (f" ({in_all} in all)" if len(counts) > 1 else "")
-
-
-def violation_types(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:
-    """Return the table of violation types: shares of the types I to V, and counts of the others."""
-    header = (
-        f"{' / '.join(PAPER_TYPES)}, %",
-        "of",
-        "late",
-        "off",
-        "hard",
-        "slid",
-        "inconclusive",
-    )
-    return _table(header, _violation_type_cells, experiment, grid, rows)
-
-
-def _violation_type_cells(searches: MethodSearches) -> list[str]:
-    if not searches.rows:
-        return [NOT_RUN, *[NONE] * 6]
-    counts = [
-        sum(row.type_counts[index] for row in searches.rows) for index in range(len(PAPER_TYPES))
-    ]
-    total = sum(counts)
-    return [
-        " / ".join(f"{100 * count / total:.0f}" for count in counts) if total else NONE,
-        str(total),
-        *(
-            str(searches.sum_of(of))
-            for of in (
-                lambda row: row.late,
-                lambda row: row.off,
-                lambda row: row.hard,
-                lambda row: row.slid,
-                lambda row: row.inconclusive,
-            )
-        ),
-    ]
 
 
 def comparison(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from lab.experiment import results as rows
 from lab.experiment import spec as plan
 from pytest_garl.cases import case_file as files
 from pytest_garl.cases import corpus
@@ -45,7 +44,6 @@ from tests.cases import samples as case_samples
 from tests.execution.flying import Good, job_of, scenario
 from tests.fuzz import binary_mutations, mutations
 from tests.gate import samples as baseline_samples
-from tests.lab.experiment.samples import row
 from tests.lab.experiment.test_spec import TEXT as PLAN
 from tests.support.results import flight_result
 
@@ -247,22 +245,6 @@ def _use(ledger: Ledger) -> None:
     ledger.queries.scenarios(0, 1, "lawn")
 
 
-def _rows() -> list[str]:
-    text = rows._dumps(
-        [
-            row(),
-            row(seed=2, top10=None),
-            row(map="lawn", violations=0, signatures=(), kind_counts=()),
-        ]
-    )
-    return [text]
-
-
-def _load_rows(path: Path, rng: random.Random) -> None:
-    found = rows.read_rows(path)
-    assert len({each.key for each in found}) <= len(found)
-
-
 def _prepare_archive(folder: Path, rng: random.Random) -> Path:
     path, genome = folder / "night.archive", genome_for(_COURT)
     whole = decode(genome.nominal, genome, map="court", seed=1)
@@ -321,5 +303,4 @@ LOADERS = {
     "record": Loader(prepare=_prepare_record, load=_load_record),
     "ledger": Loader(prepare=_prepare_ledger, load=_load_ledger),
     "archive": Loader(prepare=_prepare_archive, load=_load_archive),
-    "rows": Loader(prepare=_text_file("rows.csv", _rows), load=_load_rows),
 }

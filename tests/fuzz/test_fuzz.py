@@ -37,15 +37,15 @@ def test_the_campaign_counts_every_kind_of_failure(
             if error is not None:
                 raise error
 
-        monkeypatch.setitem(LOADERS, "rows", replace(LOADERS["rows"], load=load))
-        return campaign.load_one("rows", 1, 0, tmp_path)[0]
+        monkeypatch.setitem(LOADERS, "experiment", replace(LOADERS["experiment"], load=load))
+        return campaign.load_one("experiment", 1, 0, tmp_path)[0]
 
     from pytest_garl.errors import GarlError
 
     assert outcome(None) == "loaded"
-    assert outcome(GarlError("rows.csv: wrong")) == "clear error"
+    assert outcome(GarlError("plan.toml: wrong")) == "clear error"
     assert outcome(GarlError("something is wrong")) == "unclear error"
-    assert outcome(GarlError("rows.csv: " + "x" * campaign.LONGEST)) == "unclear error"
+    assert outcome(GarlError("plan.toml: " + "x" * campaign.LONGEST)) == "unclear error"
     assert outcome(KeyError("x")) == "raw traceback"
     assert outcome(MemoryError()) == "memory"
     assert outcome(campaign.Hang()) == "hang"
@@ -58,9 +58,9 @@ def test_a_file_that_takes_too_long_is_a_hang(
         while True:
             pass
 
-    monkeypatch.setitem(LOADERS, "rows", replace(LOADERS["rows"], load=load))
+    monkeypatch.setitem(LOADERS, "experiment", replace(LOADERS["experiment"], load=load))
     monkeypatch.setattr(campaign, "SECONDS", 0.05)
-    assert campaign.load_one("rows", 1, 0, tmp_path)[0] == "hang"
+    assert campaign.load_one("experiment", 1, 0, tmp_path)[0] == "hang"
 
 
 def test_the_same_seed_makes_the_same_files(tmp_path: Path) -> None:
@@ -85,6 +85,6 @@ def test_the_campaign_counts_a_child_that_dies(monkeypatch: pytest.MonkeyPatch) 
         return real(["prlimit", "--as=50000000", *command], **rest)  # type: ignore[call-overload]
 
     monkeypatch.setattr(subprocess, "Popen", short)
-    counts, wrong, _ = campaign.run("rows", 2, seed=1)
+    counts, wrong, _ = campaign.run("experiment", 2, seed=1)
     assert counts["hang"] == 2
     assert len(wrong) == 2

@@ -85,7 +85,6 @@ def test_tables_show_measured_figures(experiment: Experiment) -> None:
     ) in text
     # The other search of random has but four violations, less than the least of five.
     assert "| 1, 2 (2 in all) | 1, 2 (2 in all) | 1.0, 1.6 | –, 2.0 in 6 |" in text
-    assert "| garl | 10 / 20 / 0 / 60 / 10 | 20 | 6 | 2 | 0 | 2 | 0 |" in text
     assert "| –, – | 1.00 |" in text
     assert "| court | Lander | ga | not run | – | – |" in text
 
