@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
-from pytest_garl.cases.removed import NOTHING
 from pytest_garl.engine import TITLES, Engine, chosen
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.npcs.recorded import recorded_spec
@@ -25,6 +24,8 @@ Preventable = Literal["not asked", "preventable", "sensor-limited", "unpreventab
 from the state shortly after the body was first observable.  Sensor-limited: an escape exists, but
 nothing was observable in time for it.  Unpreventable: no escape exists.  Not asked: the violation
 is another one, or no flights were left for the question."""
+NOTHING = "nothing"
+"""What shrinking removed from a case that was as simple as can be."""
 NoGateReason = Literal["", "edge", "sensor-limited", "unpreventable"]
 """Why a case gates nothing; empty for one that gates."""
 NO_GATE_TEXTS: Mapping[NoGateReason, str] = MappingProxyType(

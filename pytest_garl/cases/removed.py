@@ -6,10 +6,10 @@ import re
 from dataclasses import dataclass
 from typing import Self
 
+from pytest_garl.cases.case import NOTHING
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.scenario import Scenario
 
-NOTHING = "nothing"
 _OBJECTS = re.compile(r"(\d+) of (\d+) objects?")
 _CONDITIONS = re.compile(r"(\d+) of (\d+) conditions?(?: \((\d+) of (\d+) values\))?")
 
