@@ -122,22 +122,27 @@ def _cases_outside(reporter: Any) -> list[str]:
 
 def _lines_about(record: RunRecord, run: Run, tally: Tally, reporter: Any) -> list[str]:
     width, films = width_of(reporter.config), run.films or Films()
-    lines = [wrapped(text, width, others="  ") for text in archive_lines(run)]
-    lines += [
-        line
-        for each in record.searches
-        for line in search_table(each, reporter.config, width, films.files)
-    ]
     types = legend((*record.kinds, *(finding for _, finding in record.findings)))
-    lines += [wrapped(text, width) for text in (types, _costs(record, run.options)) if text]
-    lines += _not_finished(record, run, tally)
+    costs = _costs(record, run.options)
+    unfinished = _not_finished(record, run, tally)
     worlds = dict.fromkeys(
         f"domain {search.key.domain}, NPCs {' and '.join(search.npcs)}"
         for search in record.searches
         if search.key.domain
     )
-    lines += [wrapped(world, width, others="  ") for world in worlds]
-    return [*lines, f"ledger: {record.ledger}  results {record.results_sha256[:16]}"]
+    tables = [
+        line
+        for each in record.searches
+        for line in search_table(each, reporter.config, width, films.files)
+    ]
+    return [
+        *(wrapped(text, width, others="  ") for text in archive_lines(run)),
+        *tables,
+        *(wrapped(text, width) for text in (types, costs) if text),
+        *unfinished,
+        *(wrapped(world, width, others="  ") for world in worlds),
+        f"ledger: {record.ledger}  results {record.results_sha256[:16]}",
+    ]
 
 
 def archive_lines(run: Run) -> list[str]:
@@ -221,11 +226,10 @@ def search_table(
             wrapped(line, width, first="  ", others="    ")
             for line in (*share_lines(search), *search.remarks)
         ),
-        *_kind_lines(search, search.kinds, config, width, films),
     ]
-    if search.findings:
-        lines.append("  also noted, no test fails for it:")
-        lines += _kind_lines(search, search.findings, config, width)
+    noted = ["  also noted, no test fails for it:"] if search.findings else []
+    for title, kinds, shown in (([], search.kinds, films), (noted, search.findings, NO_FILMS)):
+        lines += [*title, *_kind_lines(search, kinds, config, width, shown)]
     return lines
 
 
@@ -285,7 +289,7 @@ def _kind_lines(
     kinds: Sequence[KindRecord],
     config: pytest.Config,
     width: int,
-    films: Mapping[FilmKey, Path] = NO_FILMS,
+    films: Mapping[FilmKey, Path],
 ) -> list[str]:
     lines = []
     longest = max((len(kind.signature) for kind in kinds), default=0)
