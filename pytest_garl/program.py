@@ -24,6 +24,9 @@ from pytest_garl.errors import LandingSystemError
 
 MOST_SOURCES = 2_000
 """A program's folder with more files holds something else than its sources."""
+MOST_OUTPUT = 2**24
+"""Bytes of a program's output that are kept: a flood must not fill the disk."""
+MOST_TAIL = 2**14
 NO_SOURCES = ("test_*.py", "conftest.py", "*.pyc", "*.log")
 NO_SOURCE_FOLDERS = ("__pycache__", "node_modules", "scenarios")
 """What lies beside a program and is none of its sources: tests, caches, and saved cases."""
@@ -47,6 +50,9 @@ class ProgramSystem(abc.ABC):
     __qualname__: str
     airframe: Airframe
     settings: tuple[object, ...] = ()
+
+    output: ProgramOutput | None = None
+    """Keeps what the program prints in its flights; None keeps none."""
 
     def __init__(
         self,
@@ -146,6 +152,28 @@ class ProgramSystem(abc.ABC):
                 f"{self.name}: sources={pattern!r}: no file in {self.folder} matches"
             )
         return found
+
+
+class ProgramOutput:
+    """A file with what a program prints in its flights, up to ``MOST_OUTPUT`` bytes."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        self._room = MOST_OUTPUT
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(b"")
+
+    def write(self, data: bytes) -> None:
+        """Append what was printed; of a flood the first part."""
+        if kept := data[: self._room]:
+            self._room -= len(kept)
+            with self.file.open("ab") as opened:
+                opened.write(kept)
+
+    def last_lines(self, count: int) -> list[str]:
+        """Return the last lines that are not empty."""
+        text = self.file.read_bytes()[-MOST_TAIL:].decode(errors="replace")
+        return [line.rstrip() for line in text.splitlines() if line.strip()][-count:]
 
 
 class ProgramFailedError(Exception):

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.process_tree import descendants_of, kill
-from pytest_garl.program import ProgramFailedError
+from pytest_garl.program import ProgramFailedError, ProgramOutput
 
 SAID_BYTES = 16_384
 """How much of what a program wrote is kept: its end says why it died."""
@@ -25,8 +25,9 @@ class ProgramProcess:
     """The process of a program, from its start until ``close``.
 
     What it writes to stderr, or to stdout if both are one, is read and its end is kept, so it can
-    neither block on it nor fill a terminal.  ``options`` are those of ``subprocess.Popen``;
-    ``ending_s`` is how long it may take to end by itself when its stdin is closed.
+    neither block on it nor fill a terminal; ``output`` keeps all of it.  ``options`` are those of
+    ``subprocess.Popen``; ``ending_s`` is how long it may take to end by itself when its stdin is
+    closed.
     """
 
     def __init__(
@@ -36,10 +37,11 @@ class ProgramProcess:
         folder: Path,
         environment: Mapping[str, str],
         *,
+        output: ProgramOutput | None = None,
         ending_s: float = 0.0,
         **options: Any,
     ) -> None:
-        self._name, self._said = name, b""
+        self._name, self._said, self._output = name, b"", output
         try:
             self._process: subprocess.Popen[bytes] = subprocess.Popen(
                 command,
@@ -82,6 +84,8 @@ class ProgramProcess:
                     self._ready.unregister(self._saying)
                 return
             self._said = (self._said + data)[-SAID_BYTES:]
+            if self._output is not None:
+                self._output.write(data)
 
     @property
     def said(self) -> str:
@@ -98,6 +102,8 @@ class ProgramProcess:
 
     def close(self) -> None:
         """End the process, what it has started, and what is left of its group."""
+        if self._end.alive:
+            self.read_said()
         self._end()
 
 

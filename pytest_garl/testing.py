@@ -23,9 +23,9 @@ from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.separate_process import call_in_separate_process
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.files.json_values import dataclass_from
+from pytest_garl.files.run_files import RUN_FOLDER
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import divergence_time_s
-from pytest_garl.flight.thresholds import feet_height_m
 from pytest_garl.foreign_text import shown_foreign
 from pytest_garl.landing_system import (
     Mission,
@@ -34,10 +34,11 @@ from pytest_garl.landing_system import (
     VelocitySetpoint,
     airframe_of,
 )
+from pytest_garl.messages import shortened
 from pytest_garl.npcs.domain_policy import domain_with_policy
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.process_tree import descendants_of
-from pytest_garl.program import AnySystem, ProgramSystem
+from pytest_garl.program import AnySystem, ProgramOutput, ProgramSystem
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
@@ -56,6 +57,7 @@ from pytest_garl.search.probes import (
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.ground_truth import PilotWrapper, is_own
 from pytest_garl.simulation.system_under_test.reading import finite
+from pytest_garl.verdicts.clear_air import place_beside_marker, why_no_landing
 from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.verdict import Limits, default_distance_m
 
@@ -70,6 +72,8 @@ SLOW_CALL_S = 3.0
 and a loaded machine may be three times as slow."""
 SHORTEST_S = 2.0
 """Simulated time of the shortest flights that are still compared."""
+LAST_LINES, LINE_CHARS = 8, 200
+"""How much of what a program printed an error shows."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,13 +106,16 @@ class Check:
     """The result of a check: how the flights ended, faults, warnings, and the cost of a flight.
 
     ``flights``, ``faults`` and ``warnings`` are sentences; a search would meet a fault in every
-    flight.  ``cpu_s`` is the computing time of one flight in seconds, the simulator's included.
+    flight.  ``cpu_s`` is the computing time of one flight in seconds, the simulator's included, and
+    ``longest_cpu_s`` that of one which lasts ``longest_s``, the most that the limits allow.
     """
 
     system: str
     flights: tuple[str, ...]
     warnings: tuple[str, ...]
     cpu_s: float
+    longest_s: float = 0.0
+    longest_cpu_s: float = 0.0
     faults: tuple[str, ...] = ()
     probes: tuple[ProbeResult, ...] = ()
 
@@ -118,10 +125,13 @@ class Check:
         return not self.faults and all(probe.passed for probe in self.probes)
 
     def __str__(self) -> str:
+        most_s = max(self.cpu_s, self.longest_cpu_s)
         cost = (
-            f"a flight takes {self.cpu_s:.1f} s of computing; a search of {FLIGHTS} flights takes "
-            f"{FLIGHTS * self.cpu_s:.0f} s of it if all are like this one, and several times as "
-            "much if many fail: those are longer, and they are shrunk"
+            f"this flight took {self.cpu_s:.1f} s of computing; a search of {FLIGHTS} flights on a "
+            f"map takes {FLIGHTS * self.cpu_s:.0f} s of it if all are like this one, and "
+            f"{FLIGHTS * most_s:.0f} s if all last the {self.longest_s:.0f} s that the limits "
+            "allow, as those that fail often do; to shrink what fails takes at most as many "
+            "flights again"
         )
         found = [f"fault: {text}" for text in self.faults]
         found += [f"warning: {text}" for text in self.warnings]
@@ -272,28 +282,30 @@ class _Checker:
 
     def __init__(self, system: AnySystem, plan: CheckPlan) -> None:
         self._system, self._plan = system, plan
-        longest_s = time_limit_s(plan.limits)
-        self._seconds = plan.seconds or longest_s
-        self._whole = plan.seconds is None or plan.seconds >= longest_s
+        self._longest_s = time_limit_s(plan.limits)
+        self._seconds = plan.seconds or self._longest_s
+        self._whole = plan.seconds is None or plan.seconds >= self._longest_s
         self._map = plan.map
         self._calm, self._drawn = _scenarios(plan)
         self._limit_s = plan.limit_s
         self._meter = CallMeter(plan.limit_s)
         self._warnings: list[str] = []
         self._faults: list[str] = []
+        self._output: ProgramOutput | None = None
 
     def run(self) -> Check:
         """Fly the scenarios and compare the flights."""
         flights: list[str] = []
         probed: tuple[ProbeResult, ...] = ()
-        cpu_s = self._limit_s
+        cpu_s = longest_cpu_s = self._limit_s
         # Another process judges: a landing system may replace in this one what judges.
         with JudgeProcess() as judge, _warning_of_leftovers(self._warnings.append):
             try:
-                first = self._fly(self._system, self._calm, self._seconds)
+                first = self._fly(self._system, self._calm, self._seconds, keeps="")
                 result = judge.judge_flight(first.flight, self._plan.limits)
                 flights.append(f"{self._map.name}: {self._ending(first.flight, result)}")
                 cpu_s = first.cpu_s
+                longest_cpu_s = cpu_s * self._longest_s / max(SHORTEST_S, first.flight.elapsed_s)
                 self._note_result(first, result)
                 other = self._compare(first)
                 drawn = judge.judge_flight(other.flight, self._plan.limits)
@@ -318,6 +330,8 @@ class _Checker:
             faults=tuple(self._faults),
             probes=probed,
             cpu_s=cpu_s,
+            longest_s=self._longest_s,
+            longest_cpu_s=longest_cpu_s,
         )
 
     def _ending(self, flight: Flight, result: FlightResult) -> str:
@@ -365,7 +379,7 @@ class _Checker:
             share = (self._limit_s - first.cpu_s) / (6 * first.cpu_s)
             seconds = max(SHORTEST_S, share * first.flight.elapsed_s)
             first = self._fly(self._system, self._calm, seconds)
-        other = self._fly(self._system, self._drawn, seconds)
+        other = self._fly(self._system, self._drawn, seconds, keeps="-another")
         yaws: list[tuple[float, float]] = []
         reused = _reusing_one_instance(self._system, yaws)
         try:
@@ -408,10 +422,11 @@ class _Checker:
         """Note whether it lands in clear air, and warn of problems that a search would have."""
         flight, warn, verdict = first.flight, self._warnings.append, result.verdict
         if self._whole and (verdict.violation or not verdict.completed):
+            why = why_no_landing(Evidence(flight, self._plan.limits), verdict)
             self._faults.append(
-                "your system does not land in clear air, on "
-                f"{self._map.name} without moving objects; a search would report that again and "
-                "again"
+                f"your system does not land in clear air, on {self._map.name} without moving "
+                f"objects: {why} A search would report that again and again."
+                f"{_printed_text(self._output)}"
             )
         touchdown = flight.touchdown
         if touchdown and touchdown.stopped_s is None and result.outcome == "not_landed":
@@ -444,10 +459,21 @@ class _Checker:
         return "diagnostics=Diagnostics(target_m=(x, y, 0.0), detections=..., phase=...)"
 
     def _fly(
-        self, system: Any, scenario: Scenario, seconds: float, *, raises: bool = True
+        self,
+        system: Any,
+        scenario: Scenario,
+        seconds: float,
+        *,
+        raises: bool = True,
+        keeps: str | None = None,
     ) -> _TimedFlight:
+        """Fly a scenario; with ``keeps``, the end of a file's name, keep what a program prints."""
         began = _cpu_s()
-        with self._meter.timed(), refusing_end(self._system.__name__):
+        with (
+            self._keeping_output(keeps),
+            self._meter.timed(),
+            refusing_end(self._system.__name__),
+        ):
             flight = fly(
                 scenario,
                 system,
@@ -461,8 +487,24 @@ class _Checker:
             if "read-only" in crash.message:
                 hint = "; observations are read-only, copy the array before changing it"
             what = f"{crash.error}: {crash.message}{hint}\n{crash.traceback}".rstrip()
-            raise LandingSystemError(f"{crash.where}: {_last_place(flight)}: {what}")
+            printed = _printed_text(self._output, lines=0 if crash.traceback else LAST_LINES)
+            raise LandingSystemError(f"{crash.where}: {_last_place(flight)}: {what}{printed}")
         return _TimedFlight(flight, _cpu_s() - began)
+
+    @contextlib.contextmanager
+    def _keeping_output(self, keeps: str | None) -> Iterator[None]:
+        """Keep what a program prints, in a file below the folder of runs, if it can be written."""
+        program, self._output = self._system, None
+        if keeps is None or not isinstance(program, ProgramSystem):
+            yield
+            return
+        file = Path(RUN_FOLDER, "check", f"{program.name}-{self._map.name}{keeps}.log")
+        with contextlib.suppress(OSError):
+            self._output = program.output = ProgramOutput(file)
+        try:
+            yield
+        finally:
+            program.output = None
 
 
 def _cpu_s() -> float:
@@ -485,6 +527,18 @@ def _landed(flight: Flight, result: FlightResult) -> str:
     return ""
 
 
+def _printed_text(output: ProgramOutput | None, lines: int = LAST_LINES) -> str:
+    """Return the last lines that a program printed, and the file with all of them."""
+    if output is None:
+        return ""
+    last = output.last_lines(LAST_LINES)
+    if not last:
+        return "\nThe program printed nothing."
+    shown = [f"    {shortened(line, LINE_CHARS)}" for line in last[-lines:]] if lines else []
+    printed = ["The program printed last:", *shown] if shown else []
+    return "\n".join(["", *printed, f"All that it printed: {output.file}"])
+
+
 def _scenarios(plan: CheckPlan) -> tuple[Scenario, Scenario]:
     """Return the domain's mildest scenario and one that a search might draw; no NPC is there."""
     clear = clear_scenario(plan.map, plan.task, plan.domain)
@@ -504,14 +558,8 @@ def _last_place(flight: Flight) -> str:
 
 def _place(flight: Flight, time_s: float) -> str:
     """Return such as ``at 14.0 s, in the phase descent, 4.6 m up and 0.3 m from the marker``."""
-    index = flight.uav.index_at(time_s)
-    x, y, z = (float(value) for value in flight.uav.position_m[index])
-    beside_m = math.dist((x, y), flight.marker_position_m)
     phase = Evidence(flight).phase_at(time_s)
-    return (
-        f"at {time_s:.1f} s, in the phase {phase}, {feet_height_m(z):.1f} m up and "
-        f"{beside_m:.1f} m from the marker"
-    )
+    return f"at {time_s:.1f} s, in the phase {phase}, {place_beside_marker(flight, time_s)}"
 
 
 def _check_airframe(system: type) -> None:

@@ -7,6 +7,7 @@ import math
 import subprocess
 import threading
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -31,10 +32,12 @@ from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution import metering
 from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.execution.judge_process import JudgeProcess
+from pytest_garl.external.external_program import ExternalProgram
 from pytest_garl.search import probes
 from pytest_garl.simulation.system_under_test.ground_truth import Truth
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from pytest_garl.testing import check_landing_system
+from tests.external.programs import RISES, written
 from tests.support.probed_landers import ZeroByDefault
 
 COUNTER = itertools.count()
@@ -256,8 +259,11 @@ def test_check_flies_until_landed_and_reports_the_distance() -> None:
     (warning,) = check.warnings
     assert warning.startswith("returns no diagnostics: reports cannot say what it saw or intended")
     assert all(f"{name}=" in warning for name in ("target_m", "detections", "phase"))
-    assert "ReferencePilot: a flight takes" in str(check)
-    assert "a search of 40 flights takes" in str(check)
+    assert "ReferencePilot: this flight took" in str(check)
+    # A flight until the time is up costs more than one that lands.
+    assert check.longest_cpu_s > 3 * check.cpu_s
+    assert " if all last the 120 s that the limits allow" in str(check)
+    assert "a search of 40 flights on a map takes" in str(check)
 
 
 def test_check_refuses_a_class_that_asks_for_the_truth() -> None:
@@ -273,10 +279,35 @@ def test_check_finds_a_flight_that_depends_on_the_one_before() -> None:
 @pytest.mark.parametrize(
     ("system", "words"),
     [
-        (GivesUp, ["Gave up at", "gave up in both", "no diagnostics"]),
-        (LandsAtHome, ["Landed 16.5 m off the marker", "never name a detection"]),
-        (Climbs, ["Not landed"]),
-        (StandsOnItsFeet, ["touched the ground, but its motors did not stop"]),
+        (
+            GivesUp,
+            [
+                "moving objects: it gave up at 2.1 s, ",
+                " m up and 16.5 m from the marker. ",
+                "Gave up at",
+                "gave up in both",
+                "no diagnostics",
+            ],
+        ),
+        (
+            LandsAtHome,
+            [
+                "objects: it landed 16.5 m off the marker, on open ground. It never looked",
+                "never name a detection",
+            ],
+        ),
+        (
+            Climbs,
+            [
+                "objects: it never commanded a landing; from ",
+                " s to the end at 25 s it hovered 2.8 m up and 16.5 m from the marker. ",
+                "It never looked at a picture.",
+            ],
+        ),
+        (
+            StandsOnItsFeet,
+            ["it stood on the ground, 16.5 m off", "touched the ground, but its motors did not"],
+        ),
         (Skids, ["and slid on"]),
     ],
 )
@@ -290,6 +321,29 @@ def test_check_says_that_a_system_does_not_land_in_clear_air(
     assert fault.startswith("your system does not land in clear air, on lawn")
     for each in words:
         assert each in str(check), str(check)
+
+
+def test_check_shows_what_a_program_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program that prints and stays on the ground, and one that ends with an error."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(testing, "time_limit_s", lambda limits: 3.0)
+    monkeypatch.setattr(ExternalProgram, "check_place", lambda program: None)
+    prints = "sys.stderr.write(''.join(f'line {n}\\n' for n in range(99)))"
+    text = RISES.replace("import garl_client", "import sys, garl_client").replace("2.0", "0.0")
+    (fault,) = check_landing_system(written(tmp_path, text.format(misbehaves=prints))).faults
+    assert "it never commanded a landing; it never left the ground. It never looked" in fault
+    shown = [line.strip() for line in fault.splitlines()]
+    assert "line 98" in shown
+    assert "line 0" not in shown
+    assert shown[-1] == "All that it printed: .garl/check/lander-lawn.log"
+    kept = Path(".garl/check/lander-lawn.log").read_text().splitlines()
+    assert kept == [f"line {n}" for n in range(99)]
+    ends = written(tmp_path, text.format(misbehaves="print('bye', file=sys.stderr); sys.exit(3)"))
+    with pytest.raises(LandingSystemError) as raised:
+        check_landing_system(ends)
+    assert str(raised.value).endswith("\nbye\nAll that it printed: .garl/check/lander-lawn.log")
 
 
 def test_a_flight_that_ends_early_is_no_fault() -> None:

@@ -227,7 +227,7 @@ class Case:
         """How robust it is, in words; empty if that was not measured."""
         evidence, window_s = self.evidence, self.severity.window_s
         if window_s is not None:
-            return f"its entry has a window of {window_s:g} s"
+            return f"it collides too if the body comes at another time within {window_s:g} s"
         if not evidence.neighbours:
             return ""
         return f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too"

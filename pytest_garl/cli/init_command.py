@@ -200,9 +200,9 @@ def _write(file: Path, text: str) -> _Step:
 
 
 def _ignore(file: Path) -> _Step:
-    """Let git ignore the folder of runs."""
+    """Let git ignore the folder of runs, and in a new project what Python compiles."""
     if not file.exists():
-        return _write(file, f"{IGNORED}\n")
+        return _write(file, f"{IGNORED}\n__pycache__/\n")
     text = _text_of(file)
     if _KNOWN_IGNORES & {line.strip() for line in text.splitlines()}:
         return _Step(file=file, done="unchanged")

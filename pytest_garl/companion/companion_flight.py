@@ -33,7 +33,7 @@ from pytest_garl.landing_system import (
     Observation,
     VehicleState,
 )
-from pytest_garl.program import ProgramFailedError, end_in_words
+from pytest_garl.program import ProgramFailedError, ProgramOutput, end_in_words
 from pytest_garl.program_process import ProgramProcess
 from pytest_garl.vehicle.autopilot import ArduCopter
 from pytest_garl.vehicle.mavlink import MavlinkLink
@@ -69,6 +69,8 @@ class Start:
     folder: Path
     environment: Mapping[str, str]
     windows: str
+    output: ProgramOutput | None = None
+    """Where all that the program prints is kept."""
 
 
 def mission_facts(mission: Mission | None, camera: Camera) -> dict[str, object]:
@@ -264,13 +266,14 @@ class CompanionProcess(ProgramProcess):
             "height_px": camera.height_px,
             "rate_hz": camera.rate_hz,
         }
-        self.ended = self._listens = False
+        self.ended = self._listens = self._has_begun = False
         with theirs:
             super().__init__(
                 start.name,
                 [start.python, str(RUNNER), json.dumps(settings)],
                 start.folder,
                 {"QT_QPA_PLATFORM": "offscreen", "TZ": "UTC", **start.environment},
+                output=start.output,
                 stdin=subprocess.DEVNULL,
                 stderr=subprocess.STDOUT,
                 pass_fds=[theirs.fileno()],
@@ -284,6 +287,7 @@ class CompanionProcess(ProgramProcess):
         while True:
             kind, answer = self._read()
             if kind == b"D":
+                self._has_begun = True
                 break
             if kind == b"R":
                 self._listens = True
@@ -293,6 +297,8 @@ class CompanionProcess(ProgramProcess):
             (size,) = struct.unpack_from("!I", answer)
             facts = json.loads(answer[4 : 4 + size])
             self.ended = "ended" in facts
+            if self._output is not None:
+                self._output.write(str(facts["printed"]).encode(errors="replace"))
             return Answer(
                 sent=answer[4 + size :],
                 printed=str(facts["printed"]),
@@ -353,16 +359,27 @@ class CompanionProcess(ProgramProcess):
         return data
 
     def _tell_where_it_is(self) -> None:
-        """Say on stderr what the program computes: if it hangs, the report has that line."""
+        """Say on stderr what the program computes: if it hangs, the report has that line.
+
+        Before it has waited for the first time it starts up, which takes long for some imports.
+        """
         if not self._listens:
             return  # It would end by the signal.
+        self.read_said()
+        # The stack that it writes is none of its own output.
+        output, self._output = self._output, None
         self._process.send_signal(ASKED)
         self.ready(QUIET_S)
         time.sleep(STACK_S)
         self.read_said()
+        self._output = output
         place = self._place()
         at = f", at {place}" if place else ""
-        sys.stderr.write(f"{self._name} computes without waiting for anything{at}\n")
+        if self._has_begun:
+            text = f"{self._name} computes without waiting for anything{at}"
+        else:
+            text = f"{self._name} is starting up{at}; it has not waited for the vehicle yet"
+        sys.stderr.write(f"{text}\n")
 
     def _place(self) -> str:
         """Return where the program was, of the last stack of threads in what it wrote."""

@@ -153,6 +153,7 @@ class CompanionProgram(ProgramSystem):
                 folder=self.folder,
                 environment=self.environment,
                 windows=self.windows,
+                output=self.output,
             ),
             airframe_of(self),
             self.vehicle,

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from pytest_garl.messages import shortened
-from pytest_garl.program import ProgramFailedError, end_in_words
+from pytest_garl.program import ProgramFailedError, ProgramOutput, end_in_words
 from pytest_garl.program_process import ProgramProcess, has_ended
 
 LONGEST_LINE = 2**20
@@ -38,13 +38,19 @@ class Child(ProgramProcess):
     """
 
     def __init__(
-        self, name: str, command: Sequence[str], folder: Path, environment: Mapping[str, str]
+        self,
+        name: str,
+        command: Sequence[str],
+        folder: Path,
+        environment: Mapping[str, str],
+        output: ProgramOutput | None = None,
     ) -> None:
         super().__init__(
             name,
             command,
             folder,
             environment,
+            output=output,
             ending_s=ENDING_S,
             stdin=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -118,7 +118,9 @@ class RunningProgram:
         """Start the program, tell it its mission, and wait until it is ready."""
         self.close()
         program, self._frame = self._program, 0
-        self._child = Child(program.name, program.command, program.folder, program.environment)
+        self._child = Child(
+            program.name, program.command, program.folder, program.environment, program.output
+        )
         self._hello = self._ask("hello", protocol.hello_line(), protocol.read_hello)
         self._memory = FrameMemory(airframe_of(program).camera, self._hello.planes)
         line = protocol.reset_line(mission, self._hello, self._memory.facts)

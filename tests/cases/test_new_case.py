@@ -103,7 +103,7 @@ def test_case_of_a_crossing_gates_if_its_entry_has_a_window() -> None:
     made = new_case(REQUEST, dataclasses.replace(crossing, flight=flown))
     assert (made.reason, made.policy) == ("", "careless")
     assert made.severity == dataclasses.replace(severity, window_s=1.0)
-    assert made.robustness == "its entry has a window of 1 s"
+    assert made.robustness == "it collides too if the body comes at another time within 1 s"
     edge = new_case(REQUEST, dataclasses.replace(crossing, window_s=0.0))
     assert edge.reason == "edge"
 

@@ -53,6 +53,7 @@ def test_empty_folder_gets_a_project_whose_tests_are_collected(folder: Path) -> 
         "pytest.ini",
         ".gitignore",
     }
+    assert (folder / ".gitignore").read_text() == ".garl/\n__pycache__/\n"
     assert "    garl check test_my_landing.py\n" in done.output
     assert "    pytest --garl-budget=40 test_my_landing.py\n" in done.output
     assert "test_completes_the_mission[court-g00-s00]" in collected(folder)

@@ -42,13 +42,24 @@ def project(pytester: pytest.Pytester, text: str) -> None:
     (pytester.path / "test_it.py").write_text(TEST)
 
 
-def test_the_report_of_a_program_that_hangs_has_its_line(pytester: pytest.Pytester) -> None:
-    project(pytester, "while True: pass")
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("while True: pass", "*lander is starting up, at File*lander.py*, line 1*"),
+        (
+            "import time\ntime.sleep(1)\nwhile True: pass",
+            "*lander computes without waiting for anything, at File*lander.py*, line 3*",
+        ),
+    ],
+)
+def test_the_report_of_a_program_that_hangs_has_its_line(
+    pytester: pytest.Pytester, text: str, said: str
+) -> None:
+    project(pytester, text)
     result = run(
         pytester, "--garl-budget=2", "--garl-workers=1", "--garl-timeout=4", "-p", "no:randomly"
     )
     assert result.ret == pytest.ExitCode.TESTS_FAILED
-    said = "*computes without waiting for anything, at File*lander.py*, line 1*"
     result.stdout.fnmatch_lines([said, "*2 flights*"])
 
 
