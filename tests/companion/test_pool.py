@@ -83,7 +83,9 @@ def test_nothing_that_programs_do_ends_the_run_or_outlives_it(tmp_path: Path) ->
                 hashes.add(done.sha256)
     assert found == FINDINGS
     assert len(hashes) == 1
-    assert {each for each in shared.glob("*") if each not in before} == set()
+    # Nodes of ROS 2 that somebody flies beside the tests have segments of their own there.
+    left = {each for each in shared.glob("*") if not each.name.startswith("fastdds")}
+    assert left - before == set()
 
 
 @pytest.mark.parametrize("name", NONDETERMINISTIC)
