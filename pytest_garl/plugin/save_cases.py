@@ -161,9 +161,9 @@ def _lines_about(each: InvestigatedSignature, config: pytest.Config, width: int)
 
 
 def _seen(each: InvestigatedSignature) -> str:
-    """Return in words what was noted in how many flights."""
+    """Return in words what was noted in how many flights that can be flown without NPCs."""
     flights = counted(each.seen, "flight")
-    return f"{each.result.finding}, noted in {flights}"
+    return f"{each.result.finding}, noted in {flights} with people, dogs or birds"
 
 
 def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:

@@ -210,7 +210,8 @@ def test_what_a_collision_hid_is_flown_again_without_npcs_and_saved(
     assert len(off.scenario.removed_objects) == 4
     assert off.scenario["environment.fog"] < 0.12
     output = " ".join(result.stdout.str().split())
-    assert "flown without NPCs because of off:descending-elsewhere, noted in " in output
+    assert "because of off:descending-elsewhere, noted in " in output
+    assert "with people, dogs or birds" in output
     before = saved(pytester)
     again = run(pytester, *search)
     again.stdout.fnmatch_lines(["*without people, dogs and birds it fails as I:nothing:unseen*"])
