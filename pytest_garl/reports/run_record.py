@@ -179,9 +179,10 @@ class KindRecord:
     ) -> Self:
         """Return it with the saved cases of its search and ending, and the cause they tell.
 
-        ``others`` may tell it too.  ``flights`` are its own: of several cases one that was shrunk
-        from the first of them tells it.  The twin of another kind's flight may end alike, and its
-        case has another cause.
+        ``others`` may tell it too.  ``flights`` are its own: of several cases the one with the
+        fewest conditions that was shrunk from one of them tells it, of equal ones that of the first
+        flight.  The twin of another kind's flight may end alike, with nothing unusual, and its case
+        has another cause.
         """
         place = search.system, search.map, ending_of(self.signature)
         mine = tuple(each for each in saved if place_of(each.case) == place)
@@ -194,7 +195,7 @@ class KindRecord:
             # Shrinking and twins keep the seed of the flight with which they began.
             seeds = [each.seed for each in flights]
             order = {seed: number for number, seed in reversed([*enumerate(seeds)])}
-            telling.sort(key=lambda case: order.get(case.scenario.seed, len(seeds)))
+            telling.sort(key=lambda case: _order_of(case, order.get(case.scenario.seed)))
         return dataclasses.replace(self, saved=mine, case=next(iter(telling), None))
 
 
@@ -584,6 +585,14 @@ def by_cause(shown: Iterable[T], kind_of: Callable[[T], KindRecord]) -> list[T]:
         groups.setdefault(("", str(number)) if cause is None else cause, []).append(each)
     ordered = sorted(groups.values(), key=lambda group: -sum(kind_of(e).count for e in group))
     return [each for group in ordered for each in group]
+
+
+def _order_of(case: Case, flight: int | None) -> tuple[bool, bool, int, int]:
+    """Return the place of a case among those of its kind; ``flight`` is where it was found."""
+    if flight is None:
+        return True, False, 0, 0
+    conditions = len(case.severity.acting)
+    return False, not conditions, conditions, flight
 
 
 def place_of(case: Case) -> tuple[str, str, str]:

@@ -140,6 +140,23 @@ def test_the_case_of_a_kinds_own_flight_tells_its_cause() -> None:
     assert shown.with_cases(saved).kinds[0].case is twin
 
 
+def test_of_the_cases_of_a_kinds_flights_the_simplest_tells_its_cause() -> None:
+    both = conditions(fog="visibility 10 m", rain="2 mm/h")
+    first, second = (
+        dataclasses.replace(each, scenario=dataclasses.replace(each.scenario, seed=seed))
+        for seed, each in (
+            (7, shrunk("II:never-seen", both)),
+            (8, shrunk("II:never-seen", conditions(fog="visibility 10 m"))),
+        )
+    )
+    saved = [SavedCase(path=Path("a.toml"), case=each, known=False) for each in (first, second)]
+    flown = dataclasses.replace(
+        record(kind("II:never-seen", 2)),
+        flights=(ledger_flight(1, first), ledger_flight(2, second)),
+    )
+    assert flown.with_cases(saved).kinds[0].case is second
+
+
 def ledger_flight(number: int, case: Case) -> LedgerFlight:
     return LedgerFlight(
         id=FlightId(search="s", map="lawn", slot=Slot(generation=0, index=number)),
