@@ -103,7 +103,7 @@ def director_text(director: DirectorProgress | None) -> str:
         f"and {director.met} did"
     )
     return (
-        f"what the begins of {director.npcs} NPCs are worth, in preventable collisions per 100: "
+        f"what the timing of {director.npcs} NPCs is worth, in preventable collisions per 100: "
         f"{_above(director)} (there 1 s before the UAV); {100 * director.shipped:.1f} with the "
         f"weights that ship, {100 * director.best:.1f} at best{seen if director.seen else ''}"
     )

@@ -193,7 +193,7 @@ def test_the_summary_says_how_good_the_director_was_in_all_generations() -> None
     assert "director" not in dataclasses.replace(search, director=first).told, "too few to say"
     told = dataclasses.replace(search, director=total([first, quiet, second]))
     assert told.told["director"] == (
-        "what the begins of 20 NPCs are worth, in preventable collisions per 100: 25.0 as the "
+        "what the timing of 20 NPCs is worth, in preventable collisions per 100: 25.0 as the "
         "director decides that learns from earlier flights, 20.0 more than by the fixed rule "
         f"(there {RULE.margin_s:g} s before the UAV); 10.0 with the weights that ship, 50.0 at "
         "best; of 3 seen coming it expected 1.5 to meet the UAV, and 2 did"
