@@ -37,6 +37,7 @@ KEPT_APART = {
     "external/axes": "formulae; the protocol says which values they turn",
     "external/frame_memory": "what two processes share beside the lines of the protocol",
     "npcs/training/rewards": "formulae, named by their module where they are used",
+    "plugin/github_summary": "what only GitHub gets, outside of which it is not loaded",
     "plugin/hookspecs": "pluggy reads a module",
     "plugin/option_checks": "every pytest run loads the hooks, and few need the checks",
     "plugin/option_values": "reads texts; options says which option is which",

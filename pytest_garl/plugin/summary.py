@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
-
-import pytest
 
 from pytest_garl.cases.reference_proofs import renewal_line
 from pytest_garl.messages import command
@@ -23,11 +21,17 @@ from pytest_garl.plugin.suggested_commands import repeat_files_command, shown_pa
 from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import counted, width_of, wrapped
 from pytest_garl.reports.run_record import WHY_NO_LANDING, KindRecord, RunRecord, SearchRecord
-from pytest_garl.reports.run_text import LEGEND, PAPER_DEFINITION, limits_text, percent
+from pytest_garl.reports.run_text import (
+    LEGEND,
+    PAPER_DEFINITION,
+    RepeatCommand,
+    limits_text,
+    percent,
+)
 from pytest_garl.search.method_catalogue import remembers
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
-NO_FILMS: Mapping[FilmKey, Path] = MappingProxyType({})
+NO_FILMS: Mapping[FilmKey, str] = MappingProxyType({})
 _SKIPPED = f"Skipped: {NOT_JUDGED}:"
 """Begins pytest's reason for a test that its flight does not judge."""
 
@@ -121,7 +125,9 @@ def _cases_outside(reporter: Any) -> list[str]:
 
 
 def _lines_about(record: RunRecord, run: Run, tally: Tally, reporter: Any) -> list[str]:
-    width, films = width_of(reporter.config), run.films or Films()
+    width, config, films = width_of(reporter.config), reporter.config, run.films or Films()
+    repeat = functools.partial(repeat_files_command, config)
+    shown = {key: shown_path(film, config) for key, film in films.files.items()}
     types = legend((*record.kinds, *(finding for _, finding in record.findings)))
     costs = _costs(record, run.options)
     unfinished = _not_finished(record, run, tally)
@@ -130,11 +136,7 @@ def _lines_about(record: RunRecord, run: Run, tally: Tally, reporter: Any) -> li
         for search in record.searches
         if search.key.domain
     )
-    tables = [
-        line
-        for each in record.searches
-        for line in search_table(each, reporter.config, width, films.files)
-    ]
+    tables = [line for each in record.searches for line in search_table(each, repeat, width, shown)]
     return [
         *(wrapped(text, width, others="  ") for text in archive_lines(run)),
         *tables,
@@ -212,9 +214,9 @@ def _costs(record: RunRecord, options: Options) -> str:
 
 def search_table(
     search: SearchRecord,
-    config: pytest.Config,
+    repeat: RepeatCommand,
     width: int,
-    films: Mapping[FilmKey, Path] = NO_FILMS,
+    films: Mapping[FilmKey, str] = NO_FILMS,
 ) -> list[str]:
     """Return the shares of a search, then each kind of violation and how to see it.
 
@@ -229,7 +231,7 @@ def search_table(
     ]
     noted = ["  also noted, no test fails for it:"] if search.findings else []
     for title, kinds, shown in (([], search.kinds, films), (noted, search.findings, NO_FILMS)):
-        lines += [*title, *_kind_lines(search, kinds, config, width, shown)]
+        lines += [*title, *_kind_lines(search, kinds, repeat, width, shown)]
     return lines
 
 
@@ -287,15 +289,15 @@ def _landings(search: SearchRecord) -> str:
 def _kind_lines(
     search: SearchRecord,
     kinds: Sequence[KindRecord],
-    config: pytest.Config,
+    repeat: RepeatCommand,
     width: int,
-    films: Mapping[FilmKey, Path],
+    films: Mapping[FilmKey, str],
 ) -> list[str]:
     lines = []
     longest = max((len(kind.signature) for kind in kinds), default=0)
     for kind in kinds:
         signature = f"  {kind.count:4d}  {kind.signature:<{longest}}"
-        command = repeat_files_command(config, search.key.files, kind.first)
+        command = repeat(search.key.files, kind.first)
         fits = len(signature) + 2 + len(command) <= width
         lines += [f"{signature}  {command}"] if fits else [signature.rstrip(), f"{'':8}{command}"]
         for text in filter(None, (kind.title, kind.headline)):
@@ -304,5 +306,5 @@ def _kind_lines(
         if facts:
             lines.append(wrapped(facts, width, first=" " * 8, others=" " * 10))
         if film := films.get((search.name, kind.signature)):
-            lines.append(f"{'':8}film: {shown_path(film, config)}")
+            lines.append(f"{'':8}film: {film}")
     return lines

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from pytest_garl.execution.facts import SearchKey, search_names
+from pytest_garl.execution.facts import SearchKey
 from pytest_garl.messages import printable
 from pytest_garl.reports.run_record import (
     WHY_NO_LANDING,
@@ -83,13 +83,11 @@ class RunComparison:
 
 def compare_runs(before: RunRecord, after: RunRecord) -> RunComparison:
     """Compare an earlier run with a later one."""
-    pairs = _pairs(before, after)
-    names = search_names(_key(pair) for pair in pairs)
     return RunComparison(
         before=str(before.ledger),
         after=str(after.ledger),
         unlike=tuple(_unlike(before, after)),
-        searches=tuple(_search(pair, names[_key(pair)]) for pair in pairs),
+        searches=tuple(_search(pair) for pair in _pairs(before, after)),
     )
 
 
@@ -116,11 +114,6 @@ def _pairs(before: RunRecord, after: RunRecord) -> list[Pair]:
     return pairs
 
 
-def _key(pair: Pair) -> SearchKey:
-    """Return the key of a pair, that of the later run if both have it."""
-    return next(each.key for each in reversed(pair) if each is not None)
-
-
 def _unlike(before: RunRecord, after: RunRecord) -> Iterable[Side]:
     facts = [
         {
@@ -141,8 +134,10 @@ def _unlike(before: RunRecord, after: RunRecord) -> Iterable[Side]:
             yield Side(name=name, before=str(value), after=str(facts[1][name]))
 
 
-def _search(pair: Pair, name: str) -> SearchComparison:
+def _search(pair: Pair) -> SearchComparison:
+    """Compare a pair, which has its name in the later run if both runs flew it."""
     before, after = pair
+    last = next(each for each in reversed(pair) if each is not None)
     counts = [{kind.signature: kind for kind in each.kinds} if each else {} for each in pair]
     flown = (before.flown if before else 0, after.flown if after else 0)
     signatures = sorted(dict.fromkeys((*counts[0], *counts[1])))
@@ -151,11 +146,10 @@ def _search(pair: Pair, name: str) -> SearchComparison:
     ]
     changes.sort(key=lambda change: -(change.before + change.after))
     both = before is not None and after is not None
-    key = _key(pair)
     return SearchComparison(
-        name=name,
-        system=key.system,
-        map=key.map,
+        name=last.name,
+        system=last.key.system,
+        map=last.key.map,
         flown=flown,
         sides=tuple(
             Side(name=title, before=one, after=other)

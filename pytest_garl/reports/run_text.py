@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pytest_garl.reports.run_record import KindRecord, RunRecord
 from pytest_garl.verdicts.verdict import Limits
 
+RepeatCommand = Callable[[Sequence[str], str], str]
+"""Makes the command that flies a slot again in these files."""
 PAPER_DEFINITION = "by the paper's definition, which counts not landing"
 """How texts call the paper's definition: its type II is "no landing occurs"."""
 LEGEND = {

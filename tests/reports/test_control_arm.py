@@ -10,12 +10,12 @@ import pytest
 from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger_queries import LedgerFlight
-from pytest_garl.plugin.github_summary import _flights
 from pytest_garl.plugin.summary import search_table
 from pytest_garl.reports.control_arm import LEAST_FLIGHTS, control_arm, is_control
+from pytest_garl.reports.run_markdown import _flights
 from pytest_garl.reports.run_reading import kinds_of
 from pytest_garl.reports.run_record import SearchRecord
-from tests.support.results import flight_result
+from tests.support.results import flight_result, repeated
 
 DOG, BIRD, LOST = "IV:dog:descent:seen", "IV:bird:descent:seen", "II:lost:descent"
 
@@ -122,11 +122,9 @@ def test_assertions_of_the_user_are_left_out_of_the_comparison_but_counted_by_ki
     }
 
 
-def test_table_says_of_each_kind_in_how_many_random_flights_it_was_seen(
-    pytestconfig: pytest.Config,
-) -> None:
+def test_table_says_of_each_kind_in_how_many_random_flights_it_was_seen() -> None:
     search = record(flights([DOG, ""], [BIRD, BIRD, BIRD]))
-    lines = [line.strip() for line in search_table(search, pytestconfig, 120)]
+    lines = [line.strip() for line in search_table(search, repeated, 120)]
     assert "2 kinds of violation, as diverse as 1.8 equally frequent ones" in lines
     assert "seen in 1 of 2 random flights" in lines
     assert "seen in 0 of 2 random flights" in lines
@@ -135,7 +133,7 @@ def test_table_says_of_each_kind_in_how_many_random_flights_it_was_seen(
         "1 (1 of 2 random)",
     ]
     other = record(flights([DOG, ""], [BIRD, BIRD, BIRD]), "random")
-    assert "random flights" not in "\n".join(search_table(other, pytestconfig, 120))
+    assert "random flights" not in "\n".join(search_table(other, repeated, 120))
     assert [_flights(kind) for kind in other.kinds] == ["3", "1"]
 
 

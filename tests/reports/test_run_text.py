@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
-
 from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger_queries import LedgerFlight
@@ -14,7 +12,7 @@ from pytest_garl.plugin.summary import headline_shares, legend, search_table, sh
 from pytest_garl.reports.run_reading import kinds_of
 from pytest_garl.reports.run_record import SearchRecord, Spread
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Finding, Limits
-from tests.support.results import crash, flight_result
+from tests.support.results import crash, flight_result, repeated
 
 LANDED: dict[str, Any] = {"outcome": "landed", "completed": True}
 GAVE_UP: dict[str, Any] = {"outcome": "gave_up", "paper_violation": True}
@@ -100,9 +98,7 @@ def test_spread_of_nothing_is_none() -> None:
     assert Spread.of([3.0, 1.0, 2.0]) == Spread(median=2.0, worst=3.0)
 
 
-def test_findings_before_another_event_follow_the_violations(
-    pytestconfig: pytest.Config,
-) -> None:
+def test_findings_before_another_event_follow_the_violations() -> None:
     finding = Finding(
         signature="off:descending-elsewhere",
         margin=-4.0,
@@ -111,7 +107,7 @@ def test_findings_before_another_event_follow_the_violations(
         story="Came down 4.8 m north of the marker, which had been in view before.",
     )
     search = record((RESULTS[0], flight_result("IV:dog:descent:seen", findings=(finding,))))
-    lines = search_table(search, pytestconfig, 120)
+    lines = search_table(search, repeated, 120)
     start = lines.index("  also noted, no test fails for it:")
     assert lines[start + 1].split()[:2] == ["1", "off:descending-elsewhere"]
     assert "--garl-repeat=lawn-g00-s01" in lines[start + 1]

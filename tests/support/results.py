@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from pytest_garl.execution.result import FlightResult
@@ -63,3 +64,8 @@ def flight_result(
 def crash(kind: Any = "raised", **fields: str) -> Crash:
     """Return how a landing system broke down."""
     return Crash(**{"kind": kind, "error": "E", "message": "", **fields})
+
+
+def repeated(files: Sequence[str], slot: str) -> str:
+    """Return the command that flies a slot again, called where the files are named from."""
+    return " ".join(("pytest", *files, f"--garl-repeat={slot}"))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pytest_garl.reports.html.naming import INDEX
-from pytest_garl.reports.markdown import code, escaped, table
+from pytest_garl.reports.run_markdown import code, escaped, table
 
 if TYPE_CHECKING:
     from pytest_garl.reports.html.kind_page import Fact
