@@ -1,4 +1,8 @@
-"""Shrink a saved case further, with a temporary ledger and pool, and keep the simpler case."""
+"""Shrink a saved case further, with a temporary ledger and pool, and keep the simpler case.
+
+A case that fails in another way than the saved one, because its landing system has changed, can be
+made a case of that.
+"""
 
 from __future__ import annotations
 
@@ -66,10 +70,13 @@ def shrink_case(
     flights: int,
     workers: int,
     setup: CaseSetup | None = None,
+    *,
+    as_it_fails: bool = False,
 ) -> CaseResult:
     """Return a case that is simpler in one respect and no worse in any, or the reason for none.
 
-    Flies at most ``flights`` flights.
+    Flies at most ``flights`` flights.  With ``as_it_fails`` a case that fails in another way than
+    the saved one becomes a case of that, as complex as it is.
     """
     setup = setup or CaseSetup()
     map = load_map(case.scenario.map, map_folders)
@@ -97,7 +104,7 @@ def shrink_case(
         )
 
         def shrink_further(fly: FlyFunction) -> CaseResult:
-            return CaseReshrinker(request, fly, case).build()
+            return CaseReshrinker(request, fly, case, as_it_fails=as_it_fails).build()
 
         return OnDemandFlights(ledger, pool, lambda: None).run({case.id: shrink_further})[case.id]
 
@@ -105,8 +112,10 @@ def shrink_case(
 class CaseReshrinker:
     """Makes a simpler case from a saved one, or finds the reason why it cannot."""
 
-    def __init__(self, request: CaseRequest, fly: FlyFunction, case: Case) -> None:
-        self._request, self._case = request, case
+    def __init__(
+        self, request: CaseRequest, fly: FlyFunction, case: Case, *, as_it_fails: bool = False
+    ) -> None:
+        self._case, self._as_it_fails = case, as_it_fails
         self._flights = CaseFlights(request, fly)
 
     def build(self) -> CaseResult:
@@ -115,6 +124,8 @@ class CaseReshrinker:
         saved = self._reproduce()
         if saved is None:
             return flights.result(None, NOT_REPRODUCED)
+        if flights.request.signature != case.ending:
+            return flights.result(self._replacement(saved, flights.prevention(saved)))
         simpler = self._without_unread(saved)
         # A crossing is alone, careless and as slow as usual; its entry would lose its window.
         is_crossing = case.severity.window_s is not None
@@ -128,13 +139,20 @@ class CaseReshrinker:
         return flights.result(better, "" if better else NOTHING_SIMPLER)
 
     def _reproduce(self) -> FailingScenario | None:
-        """Fly the case once more with its record; return None if it does not fail."""
+        """Fly the case once more with its record; return None if it does not fail.
+
+        If it may be a case of how it fails today, the request becomes one for that.
+        """
         case, flights = self._case, self._flights
         flight = flights.fly_recorded(case.scenario, case.behaviour)
-        if not self._request.fails(case.scenario, flight):
-            return None
+        anew = self._is_outdated() and case.evidence.neighbours > 0
+        if not flights.request.fails(case.scenario, flight):
+            if not self._as_it_fails or not flight.signature:
+                return None
+            flights.request = dataclasses.replace(flights.request, signature=flight.signature)
+            anew = True
         evidence = case.evidence
-        if self._is_outdated() and evidence.neighbours and flights.left >= NEIGHBOURS:
+        if anew and flights.left >= NEIGHBOURS:
             # The neighbours in the file were flown with other sources.
             return flights.count_neighbours(case.scenario, case.scenario, case.behaviour, flight)
         return FailingScenario(
@@ -149,12 +167,12 @@ class CaseReshrinker:
 
     def _without_unread(self, saved: FailingScenario) -> FailingScenario:
         """Return the failure without the conditions whose data was never read: the same flight."""
-        found = without_unread(self._request, saved.scenario, saved.flight)
+        found = without_unread(self._flights.request, saved.scenario, saved.flight)
         return dataclasses.replace(saved, scenario=found) if found != saved.scenario else saved
 
     def _is_outdated(self) -> bool:
         """Return whether the case's evidence comes from other sources than today's."""
-        job = self._request.job
+        job = self._flights.request.job
         today = SourceHashes(
             system_sha256=job.system_sha256,
             simulator_sha256=simulator_sha256(job.simulator),
@@ -230,7 +248,7 @@ class CaseReshrinker:
         if case.is_shrunk:
             # What was tried when it was saved need not be tried again.
             untried = tuple(name for name in untried if name in case.severity.untried)
-        found = new_case(self._request, failing, prevention, untried)
+        found = new_case(self._flights.request, failing, prevention, untried)
         removed = all_removed(case.evidence.removed, found.evidence.removed)
         return dataclasses.replace(
             found,

@@ -275,8 +275,13 @@ def _refusal(replayed: Replay, how: str) -> str:
     help="Maximal number of flights.",
 )
 @click.option("--workers", default=2, show_default=True, help="Number of worker processes.")
+@click.option(
+    "--as-it-fails",
+    is_flag=True,
+    help="If an open case fails in another way than the saved one: make it a case of that.",
+)
 @click.pass_obj
-def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
+def shrink(project: _Project, file: Path, flights: int, workers: int, *, as_it_fails: bool) -> None:
     """Shrink a case further, from its own record.
 
     The command replaces the file only by a case that is no worse in any respect (objects, genes,
@@ -286,8 +291,13 @@ def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
     from pytest_garl.plugin.case_tests import case_setup
 
     case = project.case(file)
+    if as_it_fails and (case.status != "open" or case.assertion):
+        kind = "a fixed case must pass" if case.status != "open" else "an assertion judges it"
+        raise GarlError(f"{file}: --as-it-fails is for an open case of the verdict: {kind}")
     setup = case_setup(case, project.root)
-    result = shrink_case(case, project.root, project.maps, flights, workers, setup)
+    result = shrink_case(
+        case, project.root, project.maps, flights, workers, setup, as_it_fails=as_it_fails
+    )
     spent = f"{result.flights} flights"
     if result.case is None and result.reason != NOTHING_SIMPLER:
         replay = command("garl", "cases", "replay", file)
@@ -296,8 +306,12 @@ def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
         say(f"{file}: {result.reason} ({spent}); it stays as it is")
         return
     path = replace_file(file, result.case, project.maps)
-    renewed = result.case.id == case.id
-    done = "its evidence is renewed" if renewed else f"removed in all {result.case.removed}"
+    if result.signature != case.ending:
+        done = f"now a case of {result.signature}, which was one of {case.ending}"
+    elif result.case.id == case.id:
+        done = "its evidence is renewed"
+    else:
+        done = f"removed in all {result.case.removed}"
     say(f"{path}: {done} ({spent})")
 
 

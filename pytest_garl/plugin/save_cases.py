@@ -61,11 +61,12 @@ def save_cases(run: Run, session: pytest.Session) -> None:
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
     try:
         _collect_reported_failures(run, session)
-        requests = investigations.requests(run.user_assertions)
-        requests = (*requests, *probe_requests(run.ledger, run.options.shrink))
+        found = investigations.requests(run.user_assertions)
+        probed = probe_requests(run.ledger, run.options.shrink)
+        requests = (*found, *probed)
         if requests:
             begin_line(reporter)
-            reporter.write_line(_announcement(run, investigations, requests))
+            reporter.write_line(_announcement(run, investigations, found, probed))
         with show_progress(run, config):
             run.investigated = follow_up(
                 investigations, requests, run.finding_tests, _saver(run), run.on_wait
@@ -84,14 +85,24 @@ def save_cases(run: Run, session: pytest.Session) -> None:
         run.save_problem = str(error)
 
 
-def _announcement(run: Run, investigations: Investigations, requests: Sequence[CaseRequest]) -> str:
-    """Return how much is left to confirm and shrink; ``run.remaining`` keeps it."""
+def _announcement(
+    run: Run,
+    investigations: Investigations,
+    found: Sequence[CaseRequest],
+    probed: Sequence[CaseRequest],
+) -> str:
+    """Return how much is left to confirm and shrink; ``run.remaining`` keeps it.
+
+    What probes found is no new kind of the search, which may have found the same.
+    """
+    requests = (*found, *probed)
     work = investigations.remaining(requests, _flight_s(run, requests))
     run.remaining = work
-    kinds = f"{counted(len(requests), 'new kind')} of violation"
+    kinds = [f"{counted(len(found), 'new kind')} of violation"] if found else []
+    kinds += [counted(len(probed), "kind") + " of failed probes"] if probed else []
     beside = f", {done} done beside the search" if (done := investigations.ended) else ""
     return (
-        f"garl: confirming and shrinking {kinds}{beside}, "
+        f"garl: confirming and shrinking {' and '.join(kinds)}{beside}, "
         f"at most {counted(work.at_most, 'flight')}, about {duration(work.seconds)}"
     )
 

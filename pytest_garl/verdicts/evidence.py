@@ -33,7 +33,7 @@ LOW_M = 7.0
 """Height at which a take-off ends at the latest; whoever comes down below it is on the descent."""
 SUNK_M = 0.5
 """A UAV that is this far below its highest place so far has turned to come down; less is bobbing.
-NPCs wait for the same difference (``landing_phases.DESCENT_HYSTERESIS_M``)."""
+NPCs wait for the same difference (``landing_moments.DESCENT_HYSTERESIS_M``)."""
 LEVEL_S = 2.0
 """A UAV that rose less than that in this time before the flight's end had stopped climbing: it was
 slower than 0.25 m/s, and the flight control climbs at up to 3 m/s."""

@@ -38,10 +38,11 @@ def excuse(evidence: Evidence) -> tuple[Excuse, str]:
         return "", ""
     if _is_undetectable(evidence):
         waits = any(view.attempt for view in evidence.flight.nominal_views)
-        attempts = ", also in later attempts, for at most" if waits else ", for"
+        attempts = ", also with later attempts, for at most" if waits else " for"
         return "undetectable", (
-            f"The marker could not be read for long enough: where a landing looks for it{attempts} "
-            f"{evidence.expected_readable_s:.1f} s in all, and {READABLE_S:g} s are needed."
+            "The marker could not be read for long enough: a nominal landing could have read "
+            f"it{attempts} {evidence.expected_readable_s:.1f} s in all, and {READABLE_S:g} s are "
+            "needed."
         )
     blocked = _blocked(evidence)
     return ("blocked", blocked) if blocked else ("", "")

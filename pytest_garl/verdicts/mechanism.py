@@ -268,7 +268,7 @@ def _opportunity_text(evidence: Evidence) -> str:
     if not evidence.flight.nominal_views:
         return ""
     readable_s = evidence.expected_readable_s
-    return f" Where a landing looks for it, it could be read for {readable_s:.0f} s."
+    return f" A nominal landing could have read the marker for {readable_s:.0f} s."
 
 
 def _missed(
@@ -335,7 +335,7 @@ def _target_text(evidence: Evidence, at_s: float) -> str:
         return "; it reported no target" if any(s.diagnostics for s in flight.steps) else ""
     off_m = math.dist(target, flight.marker_position_m)
     if off_m <= AT_MARKER_M:
-        return "; its target was right"
+        return f"; its target was the marker, {off_m:.1f} m from the centre"
     if name := evidence.decoy_at(target):
         return f"; its target was {name}"
     return f"; its target was {off_m:.1f} m off the marker"

@@ -11,6 +11,7 @@ from pytest_garl.cases.case_file import size_of
 from pytest_garl.cases.investigation import MINIMUM_CASE_FLIGHTS
 from pytest_garl.cases.reshrink import (
     MINIMUM_RESHRINK_FLIGHTS,
+    NOT_REPRODUCED,
     CaseReshrinker,
     is_simpler,
     no_worse,
@@ -126,6 +127,33 @@ def test_reshrinker_renews_evidence_of_other_sources() -> None:
     assert (better.id, better.scenario) == (case.id, case.scenario)
     assert better.evidence.simulator_sha256 == simulator_sha256(BUILT_IN)
     assert better.evidence.neighbours_failed == 3
+
+
+@pytest.mark.parametrize("as_it_fails", [False, True])
+def test_a_case_that_fails_in_another_way_becomes_one_of_that_only_if_asked(
+    as_it_fails: bool,
+) -> None:
+    case = dataclasses.replace(saved(VIOLATING_SCENARIO, neighbours_failed=1), accepted=True)
+    around = (VIOLATING_SCENARIO, *neighbours(VIOLATING_SCENARIO, LAWN))
+    fly = FakeFlights(lambda scenario, _: scenario in around, "II:lost:descent")
+    request = make_case_request(60)
+    result = CaseReshrinker(request, fly, case, as_it_fails=as_it_fails).build()
+    if not as_it_fails:
+        assert (result.case, result.reason, fly.count) == (None, NOT_REPRODUCED, 1)
+        return
+    assert result.case is not None
+    assert result.signature == result.case.violation.signature == "II:lost:descent"
+    assert result.case.scenario == case.scenario
+    assert result.case.evidence.neighbours_failed == 3
+    assert (result.case.status, result.case.accepted) == ("open", True)
+    assert result.flights == fly.count == 4
+
+
+def test_a_case_that_passes_becomes_no_other_one() -> None:
+    fly = FakeFlights(lambda scenario, _: False)
+    case = saved(VIOLATING_SCENARIO)
+    result = CaseReshrinker(make_case_request(60), fly, case, as_it_fails=True).build()
+    assert (result.case, result.reason) == (None, NOT_REPRODUCED)
 
 
 def test_options_require_the_least_flights_of_their_modules() -> None:

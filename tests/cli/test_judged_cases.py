@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import shutil
 import subprocess
 import sys
@@ -51,11 +52,11 @@ def garl(*args: str | Path) -> Result:
     return CliRunner().invoke(main, ["cases", *map(str, args)], env={"COLUMNS": "200"})
 
 
-def shrunk(file: Path, flights: int) -> str:
+def shrunk(file: Path, flights: int, *more: str) -> str:
     """Shrink a case in a process of its own, as a user does: it imports the project's tests."""
     start = "from pytest_garl.cli import main; main()"
     command = [sys.executable, "-c", start, "cases", "shrink", str(file)]
-    options = [f"--flights={flights}", "--workers=0"]
+    options = [f"--flights={flights}", "--workers=0", *more]
     done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -234,6 +235,26 @@ def test_shrink_keeps_the_simplest_case(project: Path) -> None:
     assert "nothing simpler was found" in output
     assert output.endswith("it stays as it is\n")
     assert saved(project, "IV-dog").read_bytes() == before
+
+
+def test_shrink_makes_a_case_of_how_it_fails_today_if_asked(project: Path) -> None:
+    replace_text(project / "tiny_simulator.py", 'outcome = "collision"', 'outcome = "gave_up"')
+    dog = saved(project, "IV-dog")
+    assert "does not fail in the same way" in garl("shrink", dog, "--workers=0").output
+    output = shrunk(dog, 12, "--as-it-fails")
+    assert re.search(r"now a case of II:\S+, which was one of IV:dog:", output)
+    assert not (project / dog).exists()
+    case = load_case(saved(project, "II"))
+    assert (case.status, case.violation.type) == ("open", "II")
+    assert garl("replay", saved(project, "II")).output.startswith("FAILED\nII:")
+
+
+def test_only_an_open_case_becomes_one_of_how_it_fails(project: Path) -> None:
+    dog = saved(project, "IV-dog")
+    replace_file(dog, dataclasses.replace(load_case(dog), status="fixed"))
+    assert "a fixed case must pass" in garl("shrink", dog, "--as-it-fails").output
+    own = garl("shrink", saved(project, "own"), "--as-it-fails")
+    assert "an assertion judges it" in own.output
 
 
 @pytest.mark.parametrize("flights", ["0", "8", "-3"])

@@ -142,6 +142,7 @@ def test_open_case_that_fails_in_another_way_fails_the_run(searched: pytest.Pyte
     result.stdout.fnmatch_lines(
         ["*IV-dog*fails in another way.", "Saved: IV:dog:*", "Flown: III:tree:*", "See it: garl*"]
     )
+    result.stdout.fnmatch_lines(["If it is no worse*: garl cases shrink --as-it-fails *IV-dog*"])
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
 
