@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,28 +37,35 @@ def follow_up(
     tests: Mapping[SearchSignature, str],
     save: Callable[[Case], Path | None],
     on_wait: Callable[[], None],
-) -> tuple[InvestigatedSignature, ...]:
-    """End the investigations of all requests, and save the cases in the requests' order.
+) -> Iterator[InvestigatedSignature]:
+    """End the investigations of all requests; save the cases, and yield them, in their order.
 
     ``tests`` are the node ids of the tests that failed; they are known when all tests have run.
-    Behind the requests stand those for other causes of their kinds.
+    Behind the requests stand those for other causes of their kinds.  After Ctrl-C the cases of the
+    investigations that have ended are saved, and KeyboardInterrupt is raised behind them.
     """
-    results = investigations.finish(requests, on_wait)
-    further = requests
-    while further := investigations.further(further, results, on_wait):
-        results |= investigations.finish(further, on_wait)
-        requests = (*requests, *further)
+    interrupt = None
+    try:
+        results = investigations.finish(requests, on_wait)
+        further = requests
+        while further := investigations.further(further, results, on_wait):
+            results |= investigations.finish(further, on_wait)
+            requests = (*requests, *further)
+    except KeyboardInterrupt as error:
+        interrupt = error
+        requests = [request for request, _ in investigations.results]
+        results = {request.name: result for request, result in investigations.results}
     saved: set[SearchSignature] = set()
-    investigated = []
     for each in requests:
         result = results[each.name]
         # Two findings may be one violation.
         if not result.finding or (each.search, result.signature) not in saved:
             test = tests.get((each.search, each.signature), "")
             bounded = _with_worst(result, investigations.violations(each.search))
-            investigated.append(_save(each, _named_after(bounded, test), save))
+            yield _save(each, _named_after(bounded, test), save)
             saved.add((each.search, result.signature))
-    return tuple(investigated)
+    if interrupt is not None:
+        raise interrupt
 
 
 def _named_after(result: CaseResult, test: str) -> CaseResult:

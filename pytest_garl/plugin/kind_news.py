@@ -33,6 +33,7 @@ class KindNews:
         self._looked = 0.0
         self._found: set[tuple[str, str]] = set()
         self._shrunk: set[str] = set()
+        self._told: set[str] = set()
         self._kinds, self._time_left = NewKinds(run), TimeLeft(run)
         self._tells_time = run.flight_s is None
         options = run.options
@@ -85,7 +86,11 @@ class KindNews:
         for request, result in investigations.results if investigations else ():
             if request.name not in self._shrunk:
                 self._shrunk.add(request.name)
-                yield _shrunk(request, result)
+                text = _shrunk(request, result)
+                # Another cause of a kind may have shrunk to the same case.
+                if text not in self._told:
+                    self._told.add(text)
+                    yield text
 
 
 def news_of(run: Run, config: pytest.Config) -> KindNews:

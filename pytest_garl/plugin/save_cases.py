@@ -68,9 +68,10 @@ def save_cases(run: Run, session: pytest.Session) -> None:
             begin_line(reporter)
             reporter.write_line(_announcement(run, investigations, found, probed))
         with show_progress(run, config):
-            run.investigated = follow_up(
+            for each in follow_up(
                 investigations, requests, run.finding_tests, _saver(run), run.on_wait
-            )
+            ):
+                run.investigated = (*run.investigated, each)
         write_last_news(run, config)
     except KeyboardInterrupt:
         run.interrupted = True

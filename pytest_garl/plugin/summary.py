@@ -175,7 +175,7 @@ def _not_finished(record: RunRecord, run: Run, tally: Tally) -> list[str]:
     if record.flown < record.wanted:
         return [f"not finished: {record.flown} of {record.wanted} flown; {goes_on}"]
     if tally.interrupted and run.investigations is not None:
-        return [f"not finished: all {record.wanted} flown, but no case is saved; {goes_on}"]
+        return [f"not finished: all {record.wanted} flown, but not all is shrunk; {goes_on}"]
     return []
 
 
