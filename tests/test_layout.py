@@ -31,6 +31,7 @@ A number here may only fall."""
 SHORT = 100
 KEPT_APART = {
     "cases/escape_plan": "which escapes are tried; prevention decides when",
+    "cli/adapter": "`garl init` writes the text",
     "cli/case_tables": "what the commands about cases show, apart from what they do",
     "cli/film_command": "a command has a file of its own",
     "cli/skeleton": "`garl init` copies the file",

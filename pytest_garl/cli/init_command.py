@@ -14,6 +14,7 @@ from pathlib import Path
 import click
 
 from pytest_garl.cli import skeleton
+from pytest_garl.cli.adapter import adapter_name, adapter_of
 from pytest_garl.cli.check_command import imported_system
 from pytest_garl.cli.pytest_settings import PYTHONPATH, SETTINGS, find_settings
 from pytest_garl.companion.companion_program import CompanionProgram
@@ -30,18 +31,35 @@ import pytest
 from {module} import {name}
 
 """
-PROGRAM = """\
+IMPORT_WITH_MARKER = """\
 import pytest
-from pytest_garl import Camera, CompanionProgram
+from {module} import {name}
+from pytest_garl import MarkerSpec
 
-# How the program is started, with its arguments, and what its camera is.
+"""
+PROGRAM = """\
+import math
+
+import pytest
+from pytest_garl import Camera, CompanionProgram, MarkerSpec
+
+# How the program is started, and its camera; python="venv/bin/python" runs it in its own venv.
 lander = CompanionProgram(
     {words},
-    camera=Camera(width_px=640, height_px=480),
+    camera=Camera(width_px=640, height_px=480, field_of_view_rad=math.radians(90)),
 )
 """
-TEST = """\
+MARKED = """\
 pytestmark = pytest.mark.garl(system={system}, maps=["court", "lawn"])
+"""
+WITH_MARKER = """\
+pytestmark = pytest.mark.garl(
+    system={system},
+    maps=["court", "lawn"],
+    marker=MarkerSpec(dictionary="DICT_5X5_50", id=0, side_m=1.5),  # yours
+)
+"""
+TESTS = """\
 
 
 def test_lands_on_the_marker(landing):
@@ -75,7 +93,12 @@ class _Step:
 @click.option(
     "--example", is_flag=True, help="Write the three landing systems of the paper and their tests."
 )
-def init(system: str, example: bool) -> None:
+@click.option(
+    "--adapter",
+    is_flag=True,
+    help="MODULE:CLASS has an interface of its own: write a landing system around it.",
+)
+def init(system: str, *, example: bool, adapter: bool) -> None:
     """Write a test file, pytest's settings and a .gitignore entry.
 
     MODULE:CLASS is your landing system, such as my_landing:MyLandingSystem. Without it the command
@@ -98,6 +121,11 @@ def init(system: str, example: bool) -> None:
         _show(steps, test, here)
         return
     steps = []
+    if adapter and not system:
+        raise GarlError("--adapter: expected the class of your stack too, as MODULE:CLASS")
+    if adapter:
+        found, system = system, adapter_name(_imported_class(system))
+        steps.append(_write(here / f"{system.partition(':')[0]}.py", adapter_of(found)))
     if not system:
         system = SKELETON
         steps.append(_write_skeleton(here / f"{SKELETON.partition(':')[0]}.py"))
@@ -111,7 +139,7 @@ def init(system: str, example: bool) -> None:
         # The import says what is wrong with the name before anything is written with it.
         imported_system(system)
         module = system.partition(":")[0].rpartition(".")[2]
-        name, text = re.sub(r"\W", "_", module), _test_of(system)
+        name, text = re.sub(r"\W", "_", module), _test_of(system, adapter=adapter)
         needs_path = _needs_path(system, folder, here)
     test = folder / f"test_{name}.py"
     wanted = SETTINGS | (PYTHONPATH if needs_path else {})
@@ -145,11 +173,23 @@ def _needs_path(system: str, folder: Path, here: Path) -> bool:
     return is_here and folder != here and not (folder / "__init__.py").is_file()
 
 
-def _test_of(system: str) -> str:
+def _imported_class(name: str) -> str:
+    """Return the name of a class that needs an adapter; raise GarlError if there is none."""
+    try:
+        imported_system(name)
+    except GarlError as error:
+        if "has no method" not in str(error):
+            raise
+        return name
+    raise GarlError(f"--adapter: {name} has reset and step: garl init {name} writes its tests")
+
+
+def _test_of(system: str, *, adapter: bool) -> str:
     """Return the tests of a landing system, named as MODULE:CLASS."""
     module, _, qualified = system.partition(":")
-    head = IMPORT.format(module=module, name=qualified.partition(".")[0])
-    return head + TEST.format(system=qualified)
+    imports = IMPORT_WITH_MARKER if adapter else IMPORT
+    head = imports.format(module=module, name=qualified.partition(".")[0])
+    return head + (WITH_MARKER if adapter else MARKED).format(system=qualified) + TESTS
 
 
 def _test_of_program(line: str, here: Path, folder: Path) -> str:
@@ -157,7 +197,7 @@ def _test_of_program(line: str, here: Path, folder: Path) -> str:
     words = json.dumps(line, ensure_ascii=False)
     if folder != here:
         words += f',\n    folder="{Path(os.path.relpath(here, folder)).as_posix()}"'
-    return PROGRAM.format(words=words) + TEST.format(system="lander")
+    return PROGRAM.format(words=words) + WITH_MARKER.format(system="lander") + TESTS
 
 
 def _write_skeleton(file: Path) -> _Step:

@@ -173,7 +173,8 @@ def check_system(system: Any) -> None:
         if not callable(getattr(system, method, None)):
             raise LandingSystemError(
                 f"system={system.__name__} has no method {method!r}; a landing system has "
-                "reset(mission) and step(observation)"
+                "reset(mission) and step(observation), and `garl init --adapter MODULE:CLASS` "
+                "writes one around a class of another interface"
             )
     reference = reference_to(system)
     known = sys.modules.get(reference.module)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import subprocess
 import sys
@@ -13,15 +14,17 @@ from click.testing import CliRunner, Result
 
 from pytest_garl.cli import main, skeleton
 from pytest_garl.cli.init_command import SKELETON
+from pytest_garl.landing_system import Land, PositionSetpoint
 from tests.plugin.test_resume import SLOW
 from tests.support.landing_project import CONFTEST
+from tests.support.tiny_simulator import _mission, _observation
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
-    for name in ("my_landing", "lander"):
+    for name in ("my_landing", "lander", "my_stack", "my_stack_adapter"):
         monkeypatch.delitem(sys.modules, name, raising=False)
     return tmp_path
 
@@ -263,3 +266,37 @@ def test_example_is_no_landing_system_of_a_name(folder: Path) -> None:
     assert done.exit_code == 1
     assert "--example: found lander:Slow too" in done.output
     assert contents(folder) == {}
+
+
+STACK = """
+class Pilot:
+    class Lander:
+        def update(self, image, altitude_m, heading_rad, velocity_ned):
+            return "land" if altitude_m < 1 else (1.0, 2.0, 3.0)
+"""
+
+
+def test_a_class_with_another_interface_gets_an_adapter_that_flies(folder: Path) -> None:
+    (folder / "my_stack.py").write_text(STACK)
+    plain = init("my_stack:Pilot.Lander")
+    assert "has no method 'reset'" in plain.output
+    assert "garl init --adapter MODULE:CLASS" in plain.output
+    assert set(contents(folder)) == {"my_stack.py"}
+    done = init("--adapter", "my_stack:Pilot.Lander")
+    assert done.exit_code == 0, done.output
+    assert "    garl check test_my_stack_adapter.py\n" in done.output
+    assert "marker=MarkerSpec(" in (folder / "test_my_stack_adapter.py").read_text()
+    assert "test_lands_in_time[court-g00-s00]" in collected(folder)
+    adapter = importlib.import_module("my_stack_adapter").LanderAdapter()
+    adapter.reset(_mission())
+    far, there = _observation(), _observation(position=(0.0, 0.0, 9.5))
+    assert isinstance(adapter.step(far), PositionSetpoint)
+    assert adapter.step(there).velocity_mps == (2.0, 1.0, -3.0)
+    assert isinstance(adapter.step(far), Land)
+
+
+def test_adapter_is_for_a_class_without_reset_and_step(folder: Path) -> None:
+    assert "expected the class of your stack" in init("--adapter").output
+    init()
+    assert "has reset and step" in init("--adapter", SKELETON).output
+    assert "cannot be imported" in init("--adapter", "no_stack:Lander").output
