@@ -57,7 +57,7 @@ from pytest_garl.search.probes import (
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.ground_truth import PilotWrapper, is_own
 from pytest_garl.simulation.system_under_test.reading import finite
-from pytest_garl.verdicts.clear_air import place_beside_marker, why_no_landing
+from pytest_garl.verdicts.clear_air import place_beside_marker, seen_text, why_no_landing
 from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.verdict import Limits, default_distance_m
 
@@ -114,6 +114,8 @@ class Check:
     flights: tuple[str, ...]
     warnings: tuple[str, ...]
     cpu_s: float
+    task: str = ""
+    """The map, the marker that lies there, and the system's camera, in a line."""
     longest_s: float = 0.0
     longest_cpu_s: float = 0.0
     faults: tuple[str, ...] = ()
@@ -135,8 +137,8 @@ class Check:
         )
         found = [f"fault: {text}" for text in self.faults]
         found += [f"warning: {text}" for text in self.warnings]
-        lines = (*self.flights, cost, *self.probes)
-        return "\n".join([f"{self.system}: {text}" for text in lines] + found)
+        lines = (self.task, *self.flights, cost, *self.probes)
+        return "\n".join([f"{self.system}: {text}" for text in lines if text] + found)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -291,12 +293,12 @@ class _Checker:
         self._meter = CallMeter(plan.limit_s)
         self._warnings: list[str] = []
         self._faults: list[str] = []
+        self._probed: list[ProbeResult] = []
         self._output: ProgramOutput | None = None
 
     def run(self) -> Check:
         """Fly the scenarios and compare the flights."""
         flights: list[str] = []
-        probed: tuple[ProbeResult, ...] = ()
         cpu_s = longest_cpu_s = self._limit_s
         # Another process judges: a landing system may replace in this one what judges.
         with JudgeProcess() as judge, _warning_of_leftovers(self._warnings.append):
@@ -311,13 +313,11 @@ class _Checker:
                 drawn = judge.judge_flight(other.flight, self._plan.limits)
                 ending = self._ending(other.flight, drawn)
                 flights.append(f"{self._map.name}, another scenario: {ending}")
-                probed = self._probe(judge, first.flight)
+                self._probe(judge, first.flight)
                 if {result.outcome, drawn.outcome} == {"gave_up"}:
                     self._warnings.append("gave up in both scenarios; a search would learn nothing")
             except OutOfTimeError:
-                self._warnings.append(
-                    f"stopped after {self._limit_s:g} s of computing; not all flights were flown"
-                )
+                self._warnings.append(self._unflown(len(flights)))
         if self._meter.slowest_s > SLOW_CALL_S:
             self._warnings.append(
                 f"one call took {self._meter.slowest_s:.1f} s of computing; a search ends a call "
@@ -328,7 +328,8 @@ class _Checker:
             flights=tuple(flights),
             warnings=tuple(self._warnings),
             faults=tuple(self._faults),
-            probes=probed,
+            probes=tuple(self._probed),
+            task=self._task_text(),
             cpu_s=cpu_s,
             longest_s=self._longest_s,
             longest_cpu_s=longest_cpu_s,
@@ -340,27 +341,44 @@ class _Checker:
             return f"cut off after {self._seconds:g} s (--seconds), {place}"
         return _landed(flight, result) or result.verdict.story
 
-    def _probe(self, judge: JudgeProcess, twin: Flight) -> tuple[ProbeResult, ...]:
+    def _task_text(self) -> str:
+        """Return what lies there, and what it is looked at with."""
+        marker = self._plan.task.marker or self._map.marker
+        camera = airframe_of(self._system).camera
+        degrees = math.degrees(camera.field_of_view_rad)
+        return (
+            f"{self._map.name}: the marker is {marker.dictionary} id {marker.id}, "
+            f"{marker.side_m:g} m wide; the camera has {camera.width_px}x{camera.height_px} "
+            f"pixels, {camera.rate_hz:g} Hz, {degrees:.0f} degrees from left to right"
+        )
+
+    def _unflown(self, told: int) -> str:
+        """Return a warning that names what was not flown; ``told`` scenarios were."""
+        left = ["clear air", "another scenario and both again"][told:]
+        if self._plan.probes:
+            left.append("the other probes" if self._probed else "the probes")
+        return f"stopped after {self._limit_s:g} s of computing; not flown: {', '.join(left)}"
+
+    def _probe(self, judge: JudgeProcess, twin: Flight) -> None:
         """Fly the probes of a system that lands in clear air, with fresh instances."""
         plan = self._plan
         if not plan.probes or not self._whole or self._faults:
-            return ()
+            return
         self._meter.allow(plan.limit_s)
         beside = start_beside(self._calm, plan.map, plan.domain)
         base, scenario = twin, self._calm
-        found, flight = self._probed(judge, beside)
+        found, flight = self._fly_probe(judge, beside)
         if flight.outcome == "landed" and not found.violated:
             base, scenario = flight, beside.scenario
         camera = airframe_of(self._system).camera
         others = probes_for(base, scenario, plan.map, plan.domain, plan.limits, camera)
         # Some are the flight in clear air, or the one beside the marker.
         flown = (self._calm, beside.scenario)
-        return (
-            found,
-            *(self._probed(judge, each)[0] for each in others if each.scenario not in flown),
-        )
+        for each in others:
+            if each.scenario not in flown:
+                self._fly_probe(judge, each)
 
-    def _probed(self, judge: JudgeProcess, probe: Probe) -> tuple[ProbeResult, Flight]:
+    def _fly_probe(self, judge: JudgeProcess, probe: Probe) -> tuple[ProbeResult, Flight]:
         flight = self._fly(self._system, probe.scenario, self._seconds, raises=False).flight
         judged = judge.judge_flight(flight, self._plan.limits)
         result = ProbeResult(
@@ -370,6 +388,7 @@ class _Checker:
             violated=probe.is_violated(judged.verdict),
             outside=probe.outside,
         )
+        self._probed.append(result)
         return result, flight
 
     def _compare(self, first: _TimedFlight) -> _TimedFlight:
@@ -486,7 +505,9 @@ class _Checker:
             crash, hint = flight.crash, ""
             if "read-only" in crash.message:
                 hint = "; observations are read-only, copy the array before changing it"
-            what = f"{crash.error}: {crash.message}{hint}\n{crash.traceback}".rstrip()
+            saw = f"{seen_text(Evidence(flight))}\n" if flight.steps else ""
+            what = f"{crash.error}: {crash.message}{hint}\n{saw}{self._task_text()}"
+            what = f"{what}\n{crash.traceback}".rstrip()
             printed = _printed_text(self._output, lines=0 if crash.traceback else LAST_LINES)
             raise LandingSystemError(f"{crash.where}: {_last_place(flight)}: {what}{printed}")
         return _TimedFlight(flight, _cpu_s() - began)

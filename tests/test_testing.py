@@ -456,7 +456,8 @@ def test_check_flies_probes_of_a_system_that_lands(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(testing, "probes_for", two)
     calm = checker._fly(ZeroByDefault, checker._calm, 120.0)
     with JudgeProcess() as judge:
-        beside, without = checker._probe(judge, calm.flight)
+        checker._probe(judge, calm.flight)
+    beside, without = checker._probed
     assert (beside.name, beside.passed) == ("start-beside", True)
     assert str(without) == (
         "probe no-marker: FAILED: no marker is there for a minute: landed 4.0 m off the marker, on "
@@ -473,7 +474,22 @@ def test_check_flies_no_probes_of_a_system_that_does_not_land() -> None:
     calm = checker._fly(Climbs, checker._calm, 25.0)
     judge = JudgeProcess()
     checker._note_result(calm, judged(calm.flight, plan.limits))
-    assert checker._probe(judge, calm.flight) == ()
+    checker._probe(judge, calm.flight)
+    assert checker._probed == []
+
+
+def test_what_the_computing_time_leaves_unflown_is_named() -> None:
+    plan = testing.plan_for(map="lawn")
+    short = testing._Checker(Climbs, dataclasses.replace(plan, probes=True, limit_s=0.5)).run()
+    (text,) = (each for each in short.warnings if each.startswith("stopped"))
+    assert text == (
+        "stopped after 0.5 s of computing; not flown: clear air, another scenario and both again, "
+        "the probes"
+    )
+    assert str(short).startswith(
+        "Climbs: lawn: the marker is DICT_5X5_50 id 0, 1.5 m wide; the camera has 320x240 pixels, "
+        "10 Hz, 90 degrees from left to right\n"
+    )
 
 
 def test_a_violated_probe_outside_the_domain_is_a_note() -> None:

@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 import shutil
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,9 +44,9 @@ import math
 import pytest
 from pytest_garl import Camera, CompanionProgram, MarkerSpec
 
-# How the program is started, and its camera; python="venv/bin/python" runs it in its own venv.
+# How the program is started, the Python in which it runs, and its camera.
 lander = CompanionProgram(
-    {words},
+    {words},{python}
     camera=Camera(width_px=640, height_px=480, field_of_view_rad=math.radians(90)),
 )
 """
@@ -197,7 +198,19 @@ def _test_of_program(line: str, here: Path, folder: Path) -> str:
     words = json.dumps(line, ensure_ascii=False)
     if folder != here:
         words += f',\n    folder="{Path(os.path.relpath(here, folder)).as_posix()}"'
-    return PROGRAM.format(words=words) + WITH_MARKER.format(system="lander") + TESTS
+    return (
+        PROGRAM.format(words=words, python=_own_python(here))
+        + WITH_MARKER.format(system="lander")
+        + TESTS
+    )
+
+
+def _own_python(here: Path) -> str:
+    """Return the line that names the Python of a virtual environment here that is not pytest's."""
+    for name in ("venv", ".venv", "env"):
+        if (here / name / "bin" / "python").exists() and not (here / name).samefile(sys.prefix):
+            return f'\n    python="{name}/bin/python",'
+    return ""
 
 
 def _write_skeleton(file: Path) -> _Step:

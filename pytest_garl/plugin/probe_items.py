@@ -71,7 +71,12 @@ class ProbesPlugin:
         if not config.hook.pytest_garl_fly(config=config):
             run = config.stash.get(RUN, None)
             passed = passed_before(run.ledger if run is not None else None, self._options.folder)
-            items[:0] = list(probe_items(self._options, items, passed))
+            probes = list(probe_items(self._options, items, passed))
+            items[:0] = probes
+            reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
+            if reporter is not None:
+                # pytest says how many items its collectors yield; these come behind them.
+                reporter._numcollected += len(probes)
 
 
 def probe_items(

@@ -99,11 +99,14 @@ def _announcement(
     requests = (*found, *probed)
     work = investigations.remaining(requests, _flight_s(run, requests))
     run.remaining = work
-    kinds = [f"{counted(len(found), 'new kind')} of violation"] if found else []
-    kinds += [counted(len(probed), "kind") + " of failed probes"] if probed else []
+    noted = [each for each in found if each.finding]
+    new = len(found) - len(noted)
+    kinds = [f"{counted(new, 'new kind')} of violation"] if new else []
+    kinds += [f"{counted(len(noted), 'kind')} that no test fails for"] if noted else []
+    kinds += [f"{counted(len(probed), 'kind')} of failed probes"] if probed else []
     beside = f", {done} done beside the search" if (done := investigations.ended) else ""
     return (
-        f"garl: confirming and shrinking {' and '.join(kinds)}{beside}, "
+        f"garl: confirming and shrinking {', '.join(kinds)}{beside}, "
         f"at most {counted(work.at_most, 'flight')}, about {duration(work.seconds)}"
     )
 
@@ -216,7 +219,7 @@ def _not_shrunk(
     else:
         why = f"Each had at most {shrink} flights (--garl-shrink={shrink}); more shrink further"
     text = (
-        f"Not shrunk: {left} of {counted(len(investigated), 'violation')}. {why}; "
+        f"Not shrunk: {left} of {counted(len(investigated), 'cause')}. {why}; "
         "`garl cases shrink FILE` shrinks a saved case."
     )
     return [wrapped(text, width)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def why_no_landing(evidence: Evidence, verdict: Verdict) -> str:
         what = f"it {headline(verdict.story)}"
         if flight.outcome != "landed":
             return f"{what}."
-    return f"{what}. {_seen_text(evidence)}"
+    return f"{what}. {seen_text(evidence)}"
 
 
 def _last_stay(flight: Flight) -> str:
@@ -53,7 +54,7 @@ def _last_stay(flight: Flight) -> str:
     return f"from {since_s:.0f} s to the end at {end_s:.0f} s it {stayed}"
 
 
-def _seen_text(evidence: Evidence) -> str:
+def seen_text(evidence: Evidence) -> str:
     """Return in how many pictures the marker could be read, and what the system reported of it."""
     flight, end_s = evidence.flight, evidence.gave_up_s
     if flight.data_read is not None and "image" not in flight.data_read:
@@ -66,8 +67,18 @@ def _seen_text(evidence: Evidence) -> str:
     if not evidence.reports_anything:
         return f"{text}; it reported no detection, so nobody can say whether it saw the marker."
     found = sum(step.time_s <= end_s for step in evidence.reporting)
-    how = "reported a detection" if evidence.reports_detections else "named its place as the target"
-    return f"{text}, and it {how} there in {found or 'none'}."
+    if not evidence.reports_detections:
+        return f"{text}, and it named its place as the target in {found or 'none'}."
+    return f"{text}, and it detected it at its place in {found or 'none'}{_elsewhere(evidence)}."
+
+
+def _elsewhere(evidence: Evidence) -> str:
+    """Return in how many pictures a system saw markers at other places only, and how far off."""
+    reports = [each for each in evidence.reports if each.step.time_s <= evidence.gave_up_s]
+    off_m = [each.off_m for each in reports if each.off_m is not None and not each.marker]
+    if not off_m:
+        return ""
+    return f", elsewhere in {len(off_m)} ({statistics.median(off_m):.1f} m off in the median)"
 
 
 def place_beside_marker(flight: Flight, time_s: float) -> str:

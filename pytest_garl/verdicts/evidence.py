@@ -46,14 +46,23 @@ Place = tuple[float, float]
 class Report:
     """What the landing system reports with one camera frame.
 
-    ``detects`` is whether it reports a detection, ``marker`` whether one of them is at the marker's
-    place; ``target_m`` is the place (x, y) in the world of its target, None if it names none.
+    ``off_m`` is how far from the marker the nearest detection is, None if it reports none;
+    ``target_m`` is the place (x, y) in the world of its target, None if it names none.
     """
 
     step: Step
-    detects: bool
-    marker: bool
+    off_m: float | None
     target_m: Place | None
+
+    @property
+    def detects(self) -> bool:
+        """Whether it reports a detection."""
+        return self.off_m is not None
+
+    @property
+    def marker(self) -> bool:
+        """Whether it reports a detection at the marker's place."""
+        return self.off_m is not None and self.off_m <= AT_MARKER_M
 
     @property
     def elsewhere(self) -> bool:
@@ -274,8 +283,7 @@ class Evidence:
         places = (_in_world(step, each.position_m) for each in found)
         return Report(
             step=step,
-            detects=bool(found),
-            marker=any(math.dist(place, marker_m) <= AT_MARKER_M for place in places),
+            off_m=min((math.dist(place, marker_m) for place in places), default=None),
             target_m=target_of(step),
         )
 

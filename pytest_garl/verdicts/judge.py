@@ -63,7 +63,7 @@ def verdict_on(evidence: Evidence) -> Verdict:
         signature=with_cause(mechanism.signature, flight.conditions, flight.objects),
         paper_violation=far if came_down else True,
         margins=margins(evidence, violates_time=mechanism.primary in ("time", "abort")),
-        story=" ".join(filter(None, (mechanism.sentence, _standing(evidence), _where(flight)))),
+        story=" ".join(filter(None, (mechanism.sentence, _standing(evidence), _where(evidence)))),
         completed=flight.outcome == "landed" and mechanism.primary != "distance",
         excuse=why,
         excuse_text=why_text,
@@ -125,20 +125,22 @@ def _standing(evidence: Evidence) -> str:
     return ""
 
 
-def _where(flight: Flight) -> str:
-    """Return sentences about the UAV's position at the end, and about a hidden marker."""
-    x, y, z = (float(value) for value in flight.uav.position_m[-1])
+def _where(evidence: Evidence) -> str:
+    """Return where the UAV was in the end or when it gave up, and whether the marker was hidden."""
+    flight, track = evidence.flight, evidence.flight.uav
+    at_s = evidence.gave_up_s if flight.outcome == "gave_up" else flight.elapsed_s
+    x, y, z = (float(value) for value in track.position_m[track.index_at(at_s)])
     mx, my = flight.marker_position_m
     distance = math.hypot(x - mx, y - my)
     point = compass_point(x - mx, y - my)
     place = (
         f"{distance:.1f} m {point} of the marker" if distance > OVER_MARKER_M else "over the marker"
     )
-    recent = [s for s in flight.steps if s.time_s > flight.elapsed_s - RECENT_S]
+    recent = [s for s in flight.steps if at_s - RECENT_S < s.time_s <= at_s]
     hidden = ""
     share = 1 - float(np.mean([s.marker_visible for s in recent])) if recent else 0.0
     if share >= LEAST_HIDDEN_SHARE and flight.outcome not in ("landed", "slid"):
         hidden = (
-            f" In the last 2 s {100 * share:.0f} % of the marker was hidden or out of the frame."
+            f" In the 2 s before {100 * share:.0f} % of the marker was hidden or out of the frame."
         )
-    return f"At {flight.elapsed_s:.1f} s the UAV was {feet_height_m(z):.1f} m up, {place}.{hidden}"
+    return f"At {at_s:.1f} s the UAV was {feet_height_m(z):.1f} m up, {place}.{hidden}"

@@ -6,10 +6,9 @@ import math
 import re
 
 _WHERE = re.compile(
-    r"(?P<what>.*?)\.?\s+At (?P<when>[\d.]+) s the UAV was (?P<where>.+?)\.(?: In the last .*)?",
+    r"(?P<what>.*?)\.?\s+At [\d.]+ s the UAV was (?P<where>.+?)\.(?: In the 2 s before .*)?",
     re.DOTALL,
 )
-_GAVE_UP_AT = re.compile(r"Gave up at ([\d.]+) s")
 _POINTS = (
     "east",
     "north-east",
@@ -34,10 +33,6 @@ def headline(description: str) -> str:
     """
     found = _WHERE.fullmatch(description.strip())
     what, where = (found["what"], f", {found['where']}") if found else (description.strip(), "")
-    given_up = _GAVE_UP_AT.match(what)
-    if found and given_up and given_up[1] != found["when"]:
-        # It climbed away after that: the place is that of the flight's end.
-        where = ""
     if what.startswith(_RAISED):
         what = f"Python error {what.removeprefix(_RAISED)}"
     elif not what.startswith(_CRASH):

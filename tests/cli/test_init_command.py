@@ -65,12 +65,15 @@ def test_empty_folder_gets_a_project_whose_tests_are_collected(folder: Path) -> 
 def test_a_script_gets_a_test_that_starts_it(folder: Path) -> None:
     pytest.importorskip("pymavlink")
     (folder / "my lander.py").write_text("import nothing_that_is_here")
+    (folder / "venv" / "bin").mkdir(parents=True)
+    (folder / "venv" / "bin" / "python").symlink_to(sys.executable)
     (folder / "tests").mkdir()
     (folder / "pytest.ini").write_text("[pytest]\ntestpaths = tests\n")
     done = init("my lander.py")
     assert done.exit_code == 0, done.output
     written = (folder / "tests" / "test_my_lander.py").read_text()
     assert """CompanionProgram(\n    "python 'my lander.py'",\n    folder="..",\n""" in written
+    assert '    python="venv/bin/python",\n    camera=Camera(' in written
     assert "system=lander" in written
     assert "test_completes_the_mission[court-g00-s00]" in collected(folder)
 

@@ -91,7 +91,7 @@ def test_kind_beyond_the_cap_is_saved_without_shrinking(
         [
             "*confirming and shrinking 2 new kinds of violation, at most * flights, about * s",
             "*(as the search*",
-            "Not shrunk: 1 of 2 violations. By default *",
+            "Not shrunk: 1 of 2 causes. By default *",
         ]
     )
     assert "--garl-shrink=12" in result.stdout.str()

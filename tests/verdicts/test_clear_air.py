@@ -37,9 +37,12 @@ def seen(detected: Any = None, target: Any = None, view: Any = CLEAR) -> Any:
             seen(),
             "in 30 of its 30 pictures; it reported no detection, so nobody can say whether it saw",
         ),
-        (seen(detected=OVER), "pictures, and it reported a detection there in 30."),
-        (seen(detected=BESIDE), "pictures, and it reported a detection there in none."),
-        (seen(target=OVER), "pictures, and it named its place as the target there in 30."),
+        (seen(detected=OVER), "pictures, and it detected it at its place in 30."),
+        (
+            seen(detected=BESIDE),
+            "pictures, and it detected it at its place in none, elsewhere in 30 (",
+        ),
+        (seen(target=OVER), "pictures, and it named its place as the target in 30."),
         ({"data_read": ("rangefinder_m",)}, ". It never looked at a picture."),
     ],
 )

@@ -256,13 +256,13 @@ def _path_at_marker(evidence: Evidence) -> str:
 
 
 def _commanded(evidence: Evidence) -> str:
-    """Return whether the system ever said Land(), and how it ended the flight."""
+    """Return whether the system ever commanded a landing, and how it ended the flight."""
     said_s = evidence.said_abort_s
-    until = "" if said_s is None else f"; it said Abort() at {said_s:.1f} s"
+    until = "" if said_s is None else f"; it gave up at {said_s:.1f} s"
     land = [step.time_s for step in evidence.flight.steps if step.command == "Land"]
     if not land:
-        return f"It never said Land(){until}."
-    return f"It said Land() in {len(land)} frames, first at {land[0]:.1f} s{until}."
+        return f"It never commanded a landing{until}."
+    return f"It commanded a landing in {len(land)} frames, first at {land[0]:.1f} s{until}."
 
 
 def _patch(evidence: Evidence | None) -> str:
@@ -273,7 +273,8 @@ def _patch(evidence: Evidence | None) -> str:
     name = used.most_common(1)[0][0] if used else "PositionSetpoint"
     return (
         "To see its target here, return it with each command: "
-        f"{name}(..., diagnostics=Diagnostics(target_m=(x, y, 0.0))), or from a program "
+        f"{name}(..., diagnostics=Diagnostics(target_m=(x, y, 0.0))), or from a program over stdin "
         '"diagnostics": {"target_m": [x, y, 0]}, where x, y is the place that your system takes '
-        "for the marker."
+        "for the marker. Of a program over MAVLink what OpenCV's ArUco detector returns to it and "
+        "its LANDING_TARGET messages are here without that: it had none."
     )

@@ -73,7 +73,7 @@ def test_a_system_that_reports_nothing_is_not_accused() -> None:
     assert "nothing tells whether it saw the marker" in first
     assert "within 1 m of the marker, seen from above, for 2.0 s, first at 4.0 s" in first
     assert "there it was 3.9 m up at the lowest, at 4.0 s" in first
-    assert "It never said Land(); it said Abort() at 9.0 s." in first
+    assert "It never commanded a landing; it gave up at 9.0 s." in first
     assert "PositionSetpoint(..., diagnostics=Diagnostics(target_m=(x, y, 0.0)))" in patch
 
 
