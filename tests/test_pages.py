@@ -29,6 +29,11 @@ RUN_BY = {
         "Requirement",
     ),
     "garl init my_landing:MyLandingSystem": ("tests/cli/test_init_command.py", "init"),
+    "garl init --adapter my_stack:MyStack": ("tests/cli/test_init_command.py", "--adapter"),
+    'garl init "python my_lander.py --connect udp:0.0.0.0:14550"': (
+        "tests/cli/test_init_command.py",
+        "python lander.py",
+    ),
     "garl check test_my_landing.py": ("tests/cli/test_check_command.py", "check"),
     "pytest --garl-budget=40 test_my_landing.py": ("tests/test_pages.py", "--garl-budget"),
     TRY: ("tests/test_tutorial.py", "copytree"),
