@@ -72,6 +72,7 @@ def shrink_case(
     setup: CaseSetup | None = None,
     *,
     as_it_fails: bool = False,
+    on_flown: Callable[[int], None] = lambda flown: None,
 ) -> CaseResult:
     """Return a case that is simpler in one respect and no worse in any, or the reason for none.
 
@@ -106,7 +107,8 @@ def shrink_case(
         def shrink_further(fly: FlyFunction) -> CaseResult:
             return CaseReshrinker(request, fly, case, as_it_fails=as_it_fails).build()
 
-        return OnDemandFlights(ledger, pool, lambda: None).run({case.id: shrink_further})[case.id]
+        requests = OnDemandFlights(ledger, pool, lambda: on_flown(requests.flown))
+        return requests.run({case.id: shrink_further})[case.id]
 
 
 class CaseReshrinker:

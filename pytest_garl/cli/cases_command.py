@@ -295,9 +295,20 @@ def shrink(project: _Project, file: Path, flights: int, workers: int, *, as_it_f
         kind = "a fixed case must pass" if case.status != "open" else "an assertion judges it"
         raise GarlError(f"{file}: --as-it-fails is for an open case of the verdict: {kind}")
     setup = case_setup(case, project.root)
-    result = shrink_case(
-        case, project.root, project.maps, flights, workers, setup, as_it_fails=as_it_fails
-    )
+    say(f"{file}: shrinking, in at most {flights} flights", err=True)
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task("flights", total=flights)
+        result = shrink_case(
+            case,
+            project.root,
+            project.maps,
+            flights,
+            workers,
+            setup,
+            as_it_fails=as_it_fails,
+            on_flown=lambda flown: progress.update(bar, completed=flown),
+        )
     spent = f"{result.flights} flights"
     if result.case is None and result.reason != NOTHING_SIMPLER:
         replay = command("garl", "cases", "replay", file)
