@@ -165,6 +165,9 @@ def test_time_left_after_the_search_follows_the_flights_that_shrink(clock: Clock
     clock.now += 30.0
     # Ten flights took a minute, so that the other ten take another one.
     assert read(reader, Flown(flown=40, beside=10)).left_s == 60.0
+    # Other causes take flights that nobody has planned.
+    clock.now += 30.0
+    assert read(reader, Flown(flown=40, beside=20)).left_s is None
 
 
 def test_line_says_that_kinds_are_shrunk_beside_the_search() -> None:
