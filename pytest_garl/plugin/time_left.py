@@ -126,10 +126,10 @@ class TimeLeft:
         left = max(0.0, self._remaining.flights - done)
         by_plan_s = max(0.0, self._remaining.seconds - passed_s)
         left_s = left * passed_s / done if done >= _ENOUGH_AFTER else by_plan_s
-        # Flights that were not planned, for other causes, or a plan that took longer.
-        known = left_s if left and left_s else None
         return Forecast(
-            flights_after=max(after, self._flown_then + self._remaining.flights), left_s=known
+            flights_after=max(after, self._flown_then + self._remaining.flights),
+            # None if other causes take flights that nobody planned, or the plan took longer.
+            left_s=left_s or None,
         )
 
 

@@ -275,6 +275,5 @@ def _patch(evidence: Evidence | None) -> str:
         "To see its target here, return it with each command: "
         f"{name}(..., diagnostics=Diagnostics(target_m=(x, y, 0.0))), or from a program over stdin "
         '"diagnostics": {"target_m": [x, y, 0]}, where x, y is the place that your system takes '
-        "for the marker. Of a program over MAVLink what OpenCV's ArUco detector returns to it and "
-        "its LANDING_TARGET messages are here without that: it had none."
+        "for the marker. A program over MAVLink tells it by LANDING_TARGET."
     )
