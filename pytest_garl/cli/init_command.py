@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import operator
 import os
 import re
 import shlex
@@ -178,8 +179,14 @@ def _imported_class(name: str) -> str:
     """Return the name of a class that needs an adapter; raise GarlError if there is none."""
     try:
         imported_system(name)
-    except GarlError as error:
-        if "has no method" not in str(error):
+    except GarlError:
+        module, _, qualified = name.partition(":")
+        try:
+            found = operator.attrgetter(qualified)(sys.modules.get(module))
+        except AttributeError:
+            found = None
+        complete = all(callable(getattr(found, each, None)) for each in ("reset", "step"))
+        if not isinstance(found, type) or complete:
             raise
         return name
     raise GarlError(f"--adapter: {name} has reset and step: garl init {name} writes its tests")
