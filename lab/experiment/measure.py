@@ -18,14 +18,13 @@ from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.flight.flight_file import load
-from pytest_garl.gate.compatibility import limits_text
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.groups import WEATHER
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.paper_metrics import empty_cells, mark_visited, mean_distance, top_k
-from pytest_garl.verdicts.verdict import Verdict
+from pytest_garl.verdicts.verdict import Limits, Verdict
 
 HASH_DIGITS = 12
 """Number of digits of a hash in a row."""
@@ -95,12 +94,17 @@ def result_row(
         workers=workers,
         machine=cpu_class_of_flights(),
         result_hash=ledger.queries.result_hash(search.key)[:HASH_DIGITS],
-        limits=limits_text(search.job.limits),
+        limits=_limits_cell(search.job.limits),
         **_violations(search),
         **_diversity(search, str(ledger.facts.domain)),
         **_durations(search, ledger),
         **_versions(search.job, ledger),
     )
+
+
+def _limits_cell(limits: Limits) -> str:
+    """Return limits as the saved rows of experiments have them."""
+    return f"{limits.distance_m:g} m, {limits.time_s:g} s, abort {limits.abort}"
 
 
 def _violations(search: FinishedSearch) -> dict[str, Any]:

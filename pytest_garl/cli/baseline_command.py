@@ -289,7 +289,7 @@ def _progress(
 
 def _show_set(each: BaselineSet) -> None:
     from pytest_garl.gate.comparison_text import column_lines, size_lines
-    from pytest_garl.gate.compatibility import limits_text
+    from pytest_garl.verdicts.wording import limits_text
 
     flights = [flight.summary for flight in each.flights]
     inconclusive = sum(not flight.decided for flight in flights)

@@ -7,7 +7,7 @@ from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.flight.flight import version_of
 from pytest_garl.gate.baseline_file import Baseline, BaselineSet
 from pytest_garl.scenarios.task import Task
-from pytest_garl.verdicts.verdict import Limits
+from pytest_garl.verdicts.wording import limits_text
 
 
 def incompatibilities(base: BaselineSet, job: FlightJob, task: Task) -> tuple[str, ...]:
@@ -36,11 +36,6 @@ def _task_conditions(saved: Task, found: Task) -> tuple[tuple[str, str, str], ..
 def _marker_text(marker: MarkerSpec) -> str:
     nested = f", nested {marker.nested}" if marker.nested else ""
     return f"{marker.dictionary} id {marker.id} of {marker.side_m:g} m{nested}"
-
-
-def limits_text(limits: Limits) -> str:
-    """Return limits in a few words."""
-    return f"{limits.distance_m:g} m, {limits.time_s:g} s, abort {limits.abort}"
 
 
 def environment_changes(base: Baseline) -> tuple[str, ...]:

@@ -15,9 +15,9 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import counted, duration
 from pytest_garl.plugin.time_left import FIRST_FLIGHTS
-from pytest_garl.reports.run_text import limits_text
 from pytest_garl.search.method_catalogue import method_names
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
+from pytest_garl.verdicts.wording import limits_text
 
 _DEFAULT_LEDGER = f"{RUN_FOLDER}/{SEARCH_LEDGER}"
 

@@ -25,11 +25,11 @@ from pytest_garl.reports.run_text import (
     LEGEND,
     PAPER_DEFINITION,
     RepeatCommand,
-    limits_text,
     percent,
 )
 from pytest_garl.search.method_catalogue import remembers
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
+from pytest_garl.verdicts.wording import limits_text
 
 NO_FILMS: Mapping[FilmKey, str] = MappingProxyType({})
 _SKIPPED = f"Skipped: {NOT_JUDGED}:"

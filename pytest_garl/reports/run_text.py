@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pytest_garl.reports.run_record import KindRecord, RunRecord
-from pytest_garl.verdicts.verdict import Limits
 
 RepeatCommand = Callable[[Sequence[str], str], str]
 """Makes the command that flies a slot again in these files."""
@@ -65,11 +64,6 @@ def _kind_lines(kind: KindRecord) -> list[str]:
 def counts_text(counts: Mapping[Any, int]) -> str:
     """Return numbers with their names: ``needless 3, excused 0``."""
     return ", ".join(f"{name} {count}" for name, count in counts.items())
-
-
-def limits_text(limits: Limits) -> str:
-    """Return such as ``distance 0.75 m, time 120 s, abort="needless"``."""
-    return f'distance {limits.distance_m:g} m, time {limits.time_s:g} s, abort="{limits.abort}"'
 
 
 def percent(count: int, total: int) -> str:

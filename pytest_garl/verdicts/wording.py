@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import re
 
+from pytest_garl.verdicts.verdict import Limits
+
 _WHERE = re.compile(
     r"(?P<what>.*?)\.?\s+At [\d.]+ s the UAV was (?P<where>.+?)\.(?: In the 2 s before .*)?",
     re.DOTALL,
@@ -23,6 +25,11 @@ _TOUCHDOWN_DETAIL = re.compile(r"; (?:the marker (?:had|was)|its target|it repor
 """Where the detail of a touchdown off the marker begins."""
 _CRASH = "The landing system "
 _RAISED = f"{_CRASH}raised: "
+
+
+def limits_text(limits: Limits) -> str:
+    """Return such as ``distance 0.75 m, time 120 s, abort="needless"``."""
+    return f'distance {limits.distance_m:g} m, time {limits.time_s:g} s, abort="{limits.abort}"'
 
 
 def headline(description: str) -> str:

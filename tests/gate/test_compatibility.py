@@ -21,7 +21,8 @@ def test_incompatibilities_name_conditions_but_not_the_landing_system() -> None:
     assert incompatibilities(each, dataclasses.replace(job(), system_sha256="new"), Task()) == ()
     strict = dataclasses.replace(job(), limits=Limits(time_s=60.0))
     assert incompatibilities(each, strict, Task()) == (
-        "limits: saved with 0.75 m, 120 s, abort needless, found 0.75 m, 60 s, abort needless",
+        'limits: saved with distance 0.75 m, time 120 s, abort="needless", '
+        'found distance 0.75 m, time 60 s, abort="needless"',
     )
     other = job(Reference(module="sitl", file="/a/sitl.py", qualname="fly"))
     assert incompatibilities(each, other, Task()) == (

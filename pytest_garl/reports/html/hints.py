@@ -147,10 +147,11 @@ def _moving(flight: Flight | None, prevention: Prevention) -> str:
             f"The camera never showed {contact.body}: look at the field of view and at the "
             "procedure, before the code."
         )
+    first_s, last_s = (contact.time_s - each for each in (times[0], times[-1]))
     return (
-        f"{contact.body} was first in view {contact.time_s - times[0]:.1f} s before the contact: "
-        "look at what the system does with something that comes into view. Whether an escape "
-        "existed was not asked for this flight."
+        f"{contact.body} was in view for the first time {first_s:.1f} s before the contact, for "
+        f"the last {last_s:.1f} s before it: look at what the system does with something that "
+        "comes into view. Whether an escape existed was not asked for this flight."
     )
 
 

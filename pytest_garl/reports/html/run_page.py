@@ -18,10 +18,10 @@ from pytest_garl.reports.run_text import (
     LEGEND,
     PAPER_DEFINITION,
     counts_text,
-    limits_text,
     percent,
 )
 from pytest_garl.reports.sentences import counted_causes
+from pytest_garl.verdicts.wording import limits_text
 
 MOST_THUMBNAILS = 24
 """So that the index stays below 300 kB: a small picture takes some 6 kB."""
