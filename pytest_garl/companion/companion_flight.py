@@ -106,7 +106,7 @@ class CompanionFlight:
         self._autopilot = self._vehicle.autopilot(self._airframe, mission)
         self._outbox: list[bytes] = []
         self._link = MavlinkLink(self._autopilot, self._outbox.append)
-        self._inbox: deque[tuple[float, bytes]] = deque()
+        self._inbox: deque[tuple[float, bytes, str]] = deque()
         self._due_s = 0.0
         self._frames = 0
         self._observation: Observation | None = None
@@ -127,12 +127,13 @@ class CompanionFlight:
         """Fly the motors for one control step; 50 times a second the program gets its time."""
         thrusts = self._autopilot.control(state)
         while self._inbox and self._inbox[0][0] <= state.time_s:
-            self._link.receive(self._inbox.popleft()[1])
-        if self._link.nonsense:
-            field, self._link.nonsense = self._link.nonsense, ""
-            raise self._failure(
-                "BadMessage", f"sent {field}; expected a finite number", kind="nonsense"
-            )
+            _, data, line = self._inbox.popleft()
+            self._link.receive(data)
+            if self._link.nonsense:
+                field, self._link.nonsense = self._link.nonsense, ""
+                at = f" ({line})" if line else ""
+                text = f"sent {field}; expected a finite number{at}"
+                raise self._failure("BadMessage", text, kind="nonsense")
         if state.time_s >= self._due_s - 1e-9:
             self._due_s += 1 / EXCHANGES_HZ
             self._link.tell()
@@ -159,8 +160,8 @@ class CompanionFlight:
         now_s = self._autopilot.now.time_s
         answer = process.exchange(now_s, self._frames, b"".join(self._outbox), self._picture)
         self._outbox.clear()
-        if answer.sent:
-            self._inbox.append((now_s + self._airframe.latency_s, answer.sent))
+        due_s = now_s + self._airframe.latency_s
+        self._inbox.extend((due_s, data, line) for data, line in answer.sent)
         self._printed += [answer.printed] if answer.printed else []
         if self._observation is not None:
             self._seen += [
@@ -240,7 +241,8 @@ class CompanionFlight:
 class Answer:
     """What a program did in one exchange."""
 
-    sent: bytes
+    sent: list[tuple[bytes, str]]
+    """What the program sent to the vehicle, and its line that did."""
     printed: str
     found: list[tuple[int, list[tuple[float, float]]]]
     links: int
@@ -299,8 +301,13 @@ class CompanionProcess(ProgramProcess):
             self.ended = "ended" in facts
             if self._output is not None:
                 self._output.write(str(facts["printed"]).encode(errors="replace"))
+            sent, senders = answer[4 + size :], facts["senders"]
+            ends = [begin for begin, _ in (*senders, (len(sent), ""))][1:]
             return Answer(
-                sent=answer[4 + size :],
+                sent=[
+                    (sent[begin:end], str(line))
+                    for (begin, line), end in zip(senders, ends, strict=True)
+                ],
                 printed=str(facts["printed"]),
                 found=[
                     (int(number), [(float(u), float(v)) for u, v in corners])

@@ -41,6 +41,18 @@ _LEVEL_FRAME = "MAV_FRAME_LOCAL_FRD"
 _ACCEPTED = ("MAV_RESULT_ACCEPTED", "MAV_RESULT_FAILED")
 _FORCE = 21196.0
 """What param2 of MAV_CMD_COMPONENT_ARM_DISARM must be to disarm in flight."""
+_NUMBERS = {
+    22: (6,),  # MAV_CMD_NAV_TAKEOFF
+    115: (0,),  # MAV_CMD_CONDITION_YAW
+    176: (1,),  # MAV_CMD_DO_SET_MODE
+    178: (1,),  # MAV_CMD_DO_CHANGE_SPEED
+    192: (4, 5, 6),  # MAV_CMD_DO_REPOSITION
+    400: (0,),  # MAV_CMD_COMPONENT_ARM_DISARM
+    511: (0, 1),  # MAV_CMD_SET_MESSAGE_INTERVAL
+    512: (0,),  # MAV_CMD_REQUEST_MESSAGE
+}
+"""The parameters of a command that must be finite numbers; the others may be NaN, which leaves a
+choice to the vehicle."""
 _EKF_GOOD = 831
 """Flags of an estimator that knows attitude, velocities, and absolute and relative positions."""
 
@@ -211,12 +223,22 @@ class MavlinkLink:
     def _on_command_long(self, m: Any) -> None:
         d = self._d
         values = (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7)
-        frame = d.MAV_FRAME_GLOBAL_RELATIVE_ALT
-        self._mav.command_ack_send(m.command, self._obey(m.command, values, frame))
+        self._command(m, values, d.MAV_FRAME_GLOBAL_RELATIVE_ALT)
 
     def _on_command_int(self, m: Any) -> None:
         values = (m.param1, m.param2, m.param3, m.param4, m.x / 1e7, m.y / 1e7, m.z)
-        self._mav.command_ack_send(m.command, self._obey(m.command, values, m.frame))
+        self._command(m, values, m.frame)
+
+    def _command(self, m: Any, values: tuple[float, ...], frame: int) -> None:
+        d, used = self._d, _NUMBERS.get(m.command, ())
+        if m.command == d.MAV_CMD_NAV_TAKEOFF and self._autopilot.kind == "MAV_AUTOPILOT_PX4":
+            used = ()  # Without a height PX4 climbs as high as its parameter says.
+        for index in used:
+            if not math.isfinite(values[index]):
+                name = d.enums["MAV_CMD"][m.command].name
+                self.nonsense = f"{name} with param{index + 1} = {values[index]}"
+                return
+        self._mav.command_ack_send(m.command, self._obey(m.command, values, frame))
 
     def _obey(self, command: int, p: tuple[float, ...], frame: int) -> int:
         d, pilot = self._d, self._autopilot
@@ -308,7 +330,7 @@ class MavlinkLink:
         d, pilot, frame = self._d, self._autopilot, m.coordinate_frame
         offset = frame in (d.MAV_FRAME_BODY_OFFSET_NED, d.MAV_FRAME_BODY_FRD)
         heading = offset or frame == d.MAV_FRAME_BODY_NED
-        place, velocity, acceleration = self._parts(m, (m.x, m.y, m.z))
+        place, velocity, acceleration = self._parts(m, (m.x, m.y, m.z), ("x", "y", "z"))
         if place is not None:
             if offset or frame == d.MAV_FRAME_LOCAL_OFFSET_NED:
                 place = _plus(pilot.now.position_m, pilot.in_world(place, heading=offset))
@@ -317,26 +339,31 @@ class MavlinkLink:
         self._go(m, place, velocity, acceleration, heading=heading)
 
     def _on_set_position_target_global_int(self, m: Any) -> None:
-        place, velocity, acceleration = self._parts(m, (m.lat_int / 1e7, m.lon_int / 1e7, m.alt))
+        at = m.lat_int / 1e7, m.lon_int / 1e7, m.alt
+        place, velocity, acceleration = self._parts(m, at, ("lat_int", "lon_int", "alt"))
         if place is not None:
             place = self._world(*place, m.coordinate_frame)
         self._go(m, place, velocity, acceleration, heading=False)
 
-    def _parts(self, m: Any, place: Vector) -> tuple[Vector | None, Vector | None, Vector | None]:
+    def _parts(
+        self, m: Any, place: Vector, names: tuple[str, str, str]
+    ) -> tuple[Vector | None, Vector | None, Vector | None]:
         """Return what the type mask does not leave out; a part counts if none of it is left out."""
         values = (place, (m.vx, m.vy, m.vz), (m.afx, m.afy, m.afz))
         known = [
             None if m.type_mask & (0b111 << 3 * index) else each
             for index, each in enumerate(values)
         ]
-        for each in known:
-            self._note_nonsense(m, each or ())
+        fields = names, ("vx", "vy", "vz"), ("afx", "afy", "afz")
+        for each, of_part in zip(known, fields, strict=True):
+            if each is not None:
+                self._note_nonsense(m, each, of_part)
         return known[0], known[1], known[2]
 
-    def _note_nonsense(self, m: Any, values: tuple[float, ...]) -> None:
-        for each in values:
-            if not math.isfinite(each):
-                self.nonsense = f"{m.get_type()} with {each}"
+    def _note_nonsense(self, m: Any, values: Vector, names: tuple[str, str, str]) -> None:
+        for name, each in zip(names, values, strict=True):
+            if not math.isfinite(each) and not self.nonsense:
+                self.nonsense = f"{m.get_type()} with {name} = {each}"
 
     def _go(
         self,
@@ -372,8 +399,9 @@ class MavlinkLink:
 
     def _on_landing_target(self, m: Any) -> None:
         measured = getattr(m, "position_valid", 0) == 1
-        told = (m.x, m.y, m.z) if measured else (m.angle_x, m.angle_y, m.distance)
-        self._note_nonsense(m, told)
+        names = ("x", "y", "z") if measured else ("angle_x", "angle_y", "distance")
+        told = getattr(m, names[0]), getattr(m, names[1]), getattr(m, names[2])
+        self._note_nonsense(m, told, names)
         if self.nonsense:
             return
         if measured and m.frame == self._d.MAV_FRAME_LOCAL_NED:
@@ -396,6 +424,9 @@ class MavlinkLink:
 
     def _item(self, m: Any, place: Vector) -> None:
         d = self._d
+        self._note_nonsense(m, place, ("x", "y", "z"))
+        if self.nonsense:
+            return
         taken = m.current == 2 and self._autopilot.go_to(self._world(*place, m.frame))
         result = d.MAV_MISSION_ACCEPTED if taken else d.MAV_MISSION_UNSUPPORTED
         self._mav.mission_ack_send(m.get_srcSystem(), m.get_srcComponent(), result)

@@ -60,7 +60,7 @@ class Simulator:
                 self.frame += 1
             self.answer = self.process.exchange(self.now_s, self.frame, data, self.picture)
             self.printed += self.answer.printed
-            self.sent += self.answer.sent
+            self.sent += b"".join(data for data, _ in self.answer.sent)
             self.found += self.answer.found
             data = b""
             self.now_s = round(self.now_s + 0.02, 6)

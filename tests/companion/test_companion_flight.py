@@ -178,7 +178,7 @@ FAILURES: dict[str, tuple[str, str, str]] = {
         f"{HEADER}\nlink.mav.set_position_target_local_ned_send(0, 1, 1, 1, 0xDF8, float('nan'), "
         "0, 0, 0, 0, 0, 0, 0, 0, 0, 0)\ntime.sleep(9)",
         "BadMessage",
-        "SET_POSITION_TARGET_LOCAL_NED with nan; expected a finite number",
+        "SET_POSITION_TARGET_LOCAL_NED with x = nan; expected a finite number (lander.py, line ",
     ),
 }
 

@@ -231,5 +231,32 @@ def test_garbage_and_messages_for_others_are_left_out() -> None:
 def test_a_number_that_is_none_is_named() -> None:
     ground = Ground()
     ground.mav.landing_target_send(0, 0, d.MAV_FRAME_BODY_FRD, math.nan, 0.0, 1.0, 0.0, 0.0)
-    assert ground.link.nonsense == "LANDING_TARGET with nan"
+    assert ground.link.nonsense == "LANDING_TARGET with angle_x = nan"
     assert ground.autopilot.target_m is None
+
+
+@pytest.mark.parametrize(
+    ("command", "values", "name"),
+    [
+        (d.MAV_CMD_NAV_TAKEOFF, [0.0] * 6 + [math.nan], "MAV_CMD_NAV_TAKEOFF with param7"),
+        (d.MAV_CMD_DO_REPOSITION, [0.0] * 4 + [math.nan] * 3, "MAV_CMD_DO_REPOSITION with param5"),
+        (
+            d.MAV_CMD_SET_MESSAGE_INTERVAL,
+            [math.nan] * 7,
+            "MAV_CMD_SET_MESSAGE_INTERVAL with param1",
+        ),
+    ],
+)
+def test_a_command_whose_number_is_none_is_named(
+    command: int, values: list[float], name: str
+) -> None:
+    ground = Ground()
+    ground.mav.command_long_send(1, 1, command, 0, *values)
+    assert ground.link.nonsense == f"{name} = nan"
+
+
+def test_a_number_that_a_command_does_not_use_may_be_none() -> None:
+    ground = Ground()
+    ground.mav.command_long_send(1, 1, d.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1.0, *[math.nan] * 6)
+    assert ground.link.nonsense == ""
+    assert ground.autopilot.armed

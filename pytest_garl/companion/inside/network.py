@@ -37,11 +37,16 @@ _virtual = (socket.AF_INET, socket.AF_INET6, socket.AF_UNIX)
 
 
 class Network:
-    """All sockets of the program; ``outbox`` is what it has sent to the vehicle."""
+    """All sockets of the program; ``outbox`` is what it has sent to the vehicle.
 
-    def __init__(self, turns: Turns) -> None:
-        self.turns = turns
+    ``place`` returns the program's line that is running.
+    """
+
+    def __init__(self, turns: Turns, place: Callable[[], str] = str) -> None:
+        self.turns, self._line = turns, place
         self.outbox = bytearray()
+        self.senders: list[tuple[int, str]] = []
+        """Where in the outbox what a line has sent begins, and the line."""
         self.sockets: dict[int, Socket] = {}
         self.bound: dict[tuple[int, Any], Socket] = {}
         self.to_vehicle: list[Socket] = []
@@ -62,6 +67,10 @@ class Network:
 
     def transmit(self, data: bytes) -> None:
         """Send bytes to the vehicle; of a flood the first part."""
+        if len(self.outbox) < MOST_SENT:
+            line = self._line()
+            if not self.senders or self.senders[-1][1] != line:
+                self.senders.append((len(self.outbox), line))
         self.outbox += data[: MOST_SENT - len(self.outbox)]
 
     def link(self, end: Socket) -> None:

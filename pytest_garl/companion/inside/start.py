@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import faulthandler
+import functools
 import importlib.util
 import io
 import json
@@ -105,7 +106,7 @@ class Host:
     def __init__(self, wire: Wire, settings: dict[str, Any]) -> None:
         self._wire, self.settings = wire, settings
         self.turns = sys.modules[f"{NAME}.turns"].Turns(self.exchange)
-        self.network = sys.modules[f"{NAME}.network"].Network(self.turns)
+        self.network = sys.modules[f"{NAME}.network"].Network(self.turns, line_of_program)
         self.sight = sys.modules[f"{NAME}.sight"].Sight(self.turns, self.frame, settings)
         self.kept = Kept()
         self.printed = io.TextIOWrapper(
@@ -137,10 +138,12 @@ class Host:
     def tell(self, more: dict[str, Any]) -> None:
         """Write what the program did since the exchange before."""
         sent, self.network.outbox = bytes(self.network.outbox), bytearray()
+        senders, self.network.senders = self.network.senders, []
         found, self.sight.found = self.sight.found[:MOST_FOUND], []
         printed, self.kept.texts = "".join(self.kept.texts), []
         self.links_opened = max(self.links_opened, len(self.network.to_vehicle))
-        facts = {"printed": printed, "found": found, "links": self.links_opened, **more}
+        facts = {"printed": printed, "found": found, "links": self.links_opened}
+        facts.update(senders=senders, **more)
         text = json.dumps(facts).encode()
         self._wire.write(b"D", struct.pack("!I", len(text)) + text + sent)
 
@@ -293,10 +296,25 @@ def failure_of(error: BaseException) -> dict[str, Any]:
     }
 
 
+def line_of_program() -> str:
+    """Return the program's own line that is running; a library's only if all is a library's."""
+    found = ""
+    for frame, number in traceback.walk_stack(sys._getframe(1)):
+        name = frame.f_code.co_filename
+        if not _is_carrier(name):
+            line = f"{Path(name).name}, line {number}"
+            if not _is_library(name):
+                return line
+            found = found or line
+    return found
+
+
+@functools.cache
 def _is_library(name: str) -> bool:
     return "site-packages" in name or name.startswith(str(Path(os.__file__).parent))
 
 
+@functools.cache
 def _is_carrier(name: str) -> bool:
     return name.startswith((str(HERE), "<frozen")) or Path(name).name == "runpy.py"
 
