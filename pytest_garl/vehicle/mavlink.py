@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from pytest_garl.errors import LandingSystemError
@@ -221,9 +221,8 @@ class MavlinkLink:
     # What the program says.
 
     def _on_command_long(self, m: Any) -> None:
-        d = self._d
         values = (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7)
-        self._command(m, values, d.MAV_FRAME_GLOBAL_RELATIVE_ALT)
+        self._command(m, values, self._d.MAV_FRAME_GLOBAL_RELATIVE_ALT)
 
     def _on_command_int(self, m: Any) -> None:
         values = (m.param1, m.param2, m.param3, m.param4, m.x / 1e7, m.y / 1e7, m.z)
@@ -233,11 +232,9 @@ class MavlinkLink:
         d, used = self._d, _NUMBERS.get(m.command, ())
         if m.command == d.MAV_CMD_NAV_TAKEOFF and self._autopilot.kind == "MAV_AUTOPILOT_PX4":
             used = ()  # Without a height PX4 climbs as high as its parameter says.
-        for index in used:
-            if not math.isfinite(values[index]):
-                name = d.enums["MAV_CMD"][m.command].name
-                self.nonsense = f"{name} with param{index + 1} = {values[index]}"
-                return
+        numbers = {f"param{index + 1}": values[index] for index in used}
+        if used and self._refuse(d.enums["MAV_CMD"][m.command].name, numbers):
+            return
         self._mav.command_ack_send(m.command, self._obey(m.command, values, frame))
 
     def _obey(self, command: int, p: tuple[float, ...], frame: int) -> int:
@@ -357,13 +354,15 @@ class MavlinkLink:
         fields = names, ("vx", "vy", "vz"), ("afx", "afy", "afz")
         for each, of_part in zip(known, fields, strict=True):
             if each is not None:
-                self._note_nonsense(m, each, of_part)
+                self._refuse(m.get_type(), dict(zip(of_part, each, strict=True)))
         return known[0], known[1], known[2]
 
-    def _note_nonsense(self, m: Any, values: Vector, names: tuple[str, str, str]) -> None:
-        for name, each in zip(names, values, strict=True):
-            if not math.isfinite(each) and not self.nonsense:
-                self.nonsense = f"{m.get_type()} with {name} = {each}"
+    def _refuse(self, kind: str, numbers: Mapping[str, float]) -> bool:
+        """Note a number that is not finite; return whether one was noted."""
+        for name, each in numbers.items():
+            if not math.isfinite(each):
+                self.nonsense = self.nonsense or f"{kind} with {name} = {each}"
+        return bool(self.nonsense)
 
     def _go(
         self,
@@ -401,8 +400,7 @@ class MavlinkLink:
         measured = getattr(m, "position_valid", 0) == 1
         names = ("x", "y", "z") if measured else ("angle_x", "angle_y", "distance")
         told = getattr(m, names[0]), getattr(m, names[1]), getattr(m, names[2])
-        self._note_nonsense(m, told, names)
-        if self.nonsense:
+        if self._refuse(m.get_type(), dict(zip(names, told, strict=True))):
             return
         if measured and m.frame == self._d.MAV_FRAME_LOCAL_NED:
             self._autopilot.target_at(self._autopilot.in_world(told))
@@ -424,8 +422,7 @@ class MavlinkLink:
 
     def _item(self, m: Any, place: Vector) -> None:
         d = self._d
-        self._note_nonsense(m, place, ("x", "y", "z"))
-        if self.nonsense:
+        if self._refuse(m.get_type(), dict(zip("xyz", place, strict=True))):
             return
         taken = m.current == 2 and self._autopilot.go_to(self._world(*place, m.frame))
         result = d.MAV_MISSION_ACCEPTED if taken else d.MAV_MISSION_UNSUPPORTED
