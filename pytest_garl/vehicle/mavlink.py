@@ -421,11 +421,10 @@ class MavlinkLink:
         self._item(m, (m.x / 1e7, m.y / 1e7, m.z))
 
     def _item(self, m: Any, place: Vector) -> None:
-        d = self._d
         if self._refuse(m.get_type(), dict(zip("xyz", place, strict=True))):
             return
         taken = m.current == 2 and self._autopilot.go_to(self._world(*place, m.frame))
-        result = d.MAV_MISSION_ACCEPTED if taken else d.MAV_MISSION_UNSUPPORTED
+        result = self._d.MAV_MISSION_ACCEPTED if taken else self._d.MAV_MISSION_UNSUPPORTED
         self._mav.mission_ack_send(m.get_srcSystem(), m.get_srcComponent(), result)
 
     def _on_mission_request_list(self, m: Any) -> None:
