@@ -107,8 +107,8 @@ faults: $(READY)  ## search for planted faults with all arms and print the table
 
 experiment-smoke: $(READY)  ## fly, measure and report an experiment at toy size
 	rm -rf $(SMOKE)
-	$(BIN)/python -m lab.experiment docs/experiments/smoke.toml --out=$(SMOKE) --folder=$(SMOKE)/runs
-	$(BIN)/python -m lab.experiment docs/experiments/smoke.toml --out=$(SMOKE) --report
+	$(BIN)/python -m lab.experiment docs/results/experiments/smoke.toml --out=$(SMOKE) --folder=$(SMOKE)/runs
+	$(BIN)/python -m lab.experiment docs/results/experiments/smoke.toml --out=$(SMOKE) --report
 
 clean:  ## remove the virtual environments and the run folder
 	rm -rf $(VENV) .venvs .garl

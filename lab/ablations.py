@@ -1,7 +1,7 @@
 """The worth of evolution in ``garl``: searches without it, and with a model that knows nothing.
 
 The searches fly the stand-in of ``lab/stand_in.py`` in the domain `field`, where 400 flights
-take seconds.  ``python -m lab.ablations`` flies the searches that ``docs/ablations.csv`` lacks;
+take seconds.  ``python -m lab.ablations`` flies the searches that ``docs/results/ablations.csv`` lacks;
 ``--report`` prints the table, which compares each variant with ``garl`` seed by seed.
 """
 
@@ -38,7 +38,7 @@ SEEDS = tuple(str(seed) for seed in range(204, 210))
 LANDINGS = {"ordinary": ORDINARY, "sturdy": STURDY}
 LEVEL = 0.90
 TABLE = ResultTable(
-    file=Path("docs/ablations.csv"),
+    file=Path("docs/results/ablations.csv"),
     columns=("variant", "landing", "seed", "map", "budget", "early", "middle", "first", "kinds"),
     key=("variant", "landing", "seed", "map"),
 )

@@ -22,7 +22,7 @@ SEPARATOR = "|"
 class ResultRow:
     """The results of one search: a system on a map, a method, a seed, a budget.
 
-    ``docs/experiments/README.md`` explains each column.  None stands for a value that does not
+    ``docs/results/experiments/README.md`` explains each column.  None stands for a value that does not
     exist, such as a tenth violation after only nine.
     """
 

@@ -44,7 +44,7 @@ SHRINK_FLIGHTS = 12
 MOST_ASKED = 3
 LEAST_TWINS = 2
 TABLE = ResultTable(
-    file=Path("docs/judge-causes.csv"),
+    file=Path("docs/results/judge-causes.csv"),
     columns=(
         *("arm", "system", "seed", "map", "flights", "control", "violations", "signatures"),
         *("causes", "count", "asked", "unconfirmed", "beside", "commit"),

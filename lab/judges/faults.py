@@ -34,7 +34,7 @@ LEAST_FAULTY, MOST_CONTROLS = 3, 1
 """Of four twins of the faulty system so many must violate, and of those of the control at most."""
 WITHIN = (10, 25, 50, 100)
 TABLE = ResultTable(
-    file=Path("docs/judge-faults.csv"),
+    file=Path("docs/results/judge-faults.csv"),
     columns=(
         *("arm", "fault", "seed", "flights", "map", "control", "found_at", "how", "signature"),
         *("unconfirmed", "masked", "commit"),

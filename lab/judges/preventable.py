@@ -43,7 +43,7 @@ NEAR_TOUCHDOWN_S = 1.0
 SLOWEST_MPS = 0.2
 AT_DECISION = STORY_MOMENTS.index(DECIDED)
 TABLE = ResultTable(
-    file=Path("docs/judge-preventable.csv"),
+    file=Path("docs/results/judge-preventable.csv"),
     columns=(
         *("arm", "system", "map", "seed", "flights", "counted", "sensor_limited", "unpreventable"),
         *("edge", "near_touchdown", "collisions", "violations", "hits", "commit"),

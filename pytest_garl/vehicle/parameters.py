@@ -148,7 +148,7 @@ def tuned(hover_throttle: float, base: ArduPilotParameters | None = None) -> Ard
     error needs no filter of 2.5 Hz).  AutoTune's results for vehicles of this kind in ArduPilot's
     published parameter files are a P of 1.2 and a D of 0.022 (Holybro X500 v2) and a P of 1.0
     (Parrot Bebop).  ``ATC_ACCEL_Y_MAX`` is half of the 190 degrees/s² that the motors can give in
-    a hover.  ``docs/control.md`` has the step responses of both.
+    a hover.  ``docs/results/control.md`` has the step responses of both.
     """
     return replace(
         base or ArduPilotParameters(),

@@ -91,7 +91,7 @@ def test_the_control_lands_in_the_nominal_scenario(map_name: str) -> None:
 
 
 def test_the_page_lists_every_fault_with_its_links() -> None:
-    page = Path("docs/faults.md").read_text()
+    page = Path("docs/results/faults.md").read_text()
     for fault in FAULTS:
         assert f"| `{fault.name}` |" in page
         assert all(link in page for link in fault.links)

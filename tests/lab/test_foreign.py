@@ -142,7 +142,7 @@ REPORTED = {
     "kyujin-other-marker": "I:decoy-other-id:seen",
     "pandya-other-marker": "off:unseen:decoy",
 }
-"""Scenarios of docs/foreign-systems.md."""
+"""Scenarios of docs/results/foreign-systems.md."""
 
 
 @pytest.mark.sim

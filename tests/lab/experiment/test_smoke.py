@@ -9,7 +9,7 @@ import pytest
 from lab.experiment.results import read_rows
 
 ROOT = Path(__file__).parents[3]
-PLAN = "docs/experiments/smoke.toml"
+PLAN = "docs/results/experiments/smoke.toml"
 
 
 def test_make_runs_the_experiment_tested_here() -> None:
