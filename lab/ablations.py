@@ -1,8 +1,8 @@
 """The worth of evolution in ``garl``: searches without it, and with a model that knows nothing.
 
 The searches fly the stand-in of ``lab/stand_in.py`` in the domain `field`, where 400 flights
-take seconds.  ``python -m lab.ablations`` flies the searches that ``docs/results/ablations.csv`` lacks;
-``--report`` prints the table, which compares each variant with ``garl`` seed by seed.
+take seconds.  ``python -m lab.ablations`` flies the searches that ``docs/results/ablations.csv``
+lacks; ``--report`` prints the table, which compares each variant with ``garl`` seed by seed.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ def test_the_page_of_experiments_tells_every_column_and_every_key() -> None:
     from lab.experiment.results import ResultRow
     from lab.experiment.spec import TOP_KEYS
 
-    text = (DOCS / "experiments" / "README.md").read_text()
+    text = (DOCS / "results" / "experiments" / "README.md").read_text()
     types = {f"type_{kind}" for kind in ("ii", "iii", "iv")}
     columns = {field.name for field in dataclasses.fields(ResultRow)} - types
     assert [name for name in columns if f"`{name}`" not in text] == []

@@ -16,7 +16,8 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
 
 @click.command(
     cls=Pinned,
-    epilog="Example: python -m lab.experiment docs/results/experiments/smoke.toml --out=.garl/smoke",
+    epilog="Example: "
+    "python -m lab.experiment docs/results/experiments/smoke.toml --out=.garl/smoke",
 )
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
 @click.option(

@@ -22,8 +22,8 @@ SEPARATOR = "|"
 class ResultRow:
     """The results of one search: a system on a map, a method, a seed, a budget.
 
-    ``docs/results/experiments/README.md`` explains each column.  None stands for a value that does not
-    exist, such as a tenth violation after only nine.
+    ``docs/results/experiments/README.md`` explains each column.  None stands for a value that does
+    not exist, such as a tenth violation after only nine.
     """
 
     system: str

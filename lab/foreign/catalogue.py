@@ -41,7 +41,9 @@ class Foreign:
     @property
     def problem(self) -> str:
         """What is missing to fly it; empty if nothing is."""
-        no_python = f"{self.python}: no such file; docs/results/foreign-systems.md says what it needs"
+        no_python = (
+            f"{self.python}: no such file; docs/results/foreign-systems.md says what it needs"
+        )
         return self.repository.problem or ("" if self.python.is_file() else no_python)
 
 

@@ -2,7 +2,8 @@
 
 A small monotone network of the facts of a ``MarkerView``: one layer of logistic units whose weights
 are not negative, and a logistic unit over them.  The study of detectability fits it to frames that
-detectors have read and writes ``detectability.json``; docs/results/detectability.md tells how good it is.
+detectors have read and writes ``detectability.json``; docs/results/detectability.md tells how
+good it is.
 """
 
 from __future__ import annotations

@@ -40,8 +40,9 @@ NOTICED_S = 0.3
 """From the first sight to the first command of an escape takes so long, as in the question whether
 a real collision was preventable (:data:`pytest_garl.cases.case.REACTION_S`)."""
 ESCAPE_S = 1.0
-"""A UAV needs so long to get out of the way: of the 41 collisions that docs/results/preventability.csv
-asked about, each had an escape 1 s before the contact, and half of them none 0.5 s before it."""
+"""A UAV needs so long to get out of the way: of the 41 collisions that
+docs/results/preventability.csv asked about, each had an escape 1 s before the contact, and half of
+them none 0.5 s before it."""
 WITHIN_S = 5.3
 """What the camera showed longer before a contact does not count
 (:data:`pytest_garl.cases.case.OBSERVED_WITHIN_S`)."""
