@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pytest_garl import cpu_dispatch
+from pytest_garl.companion.companion_program import CompanionProgram
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution.exit_guard import refusing_end
 from pytest_garl.execution.fly_and_judge import time_limit_s
@@ -65,6 +66,10 @@ FLIGHTS = 40
 """Flights of the search whose time the check estimates: the README's first budget."""
 LARGEST_YAW_RAD = 2 * math.pi
 """A heading beyond a full turn is taken for degrees."""
+WHERE_TO_FLY = (
+    "A program is told about where the marker is by {north_m} {east_m} or {lat_deg} {lon_deg} in "
+    "the line that starts it."
+)
 SLOW_FLIGHT_S = 10.0
 """Computing time of one flight above which the check warns: a night has some 3,000 such flights."""
 SLOW_CALL_S = 3.0
@@ -132,8 +137,8 @@ class Check:
             f"this flight took {self.cpu_s:.1f} s of computing; a search of {FLIGHTS} flights on a "
             f"map takes {FLIGHTS * self.cpu_s:.0f} s of it if all are like this one, and "
             f"{FLIGHTS * most_s:.0f} s if all last the {self.longest_s:.0f} s that the limits "
-            "allow, as those that fail often do; to shrink what fails takes at most as many "
-            "flights again"
+            "allow, as those that fail often do; to shrink what fails takes about as many "
+            "flights again; workers share all of it"
         )
         found = [f"fault: {text}" for text in self.faults]
         found += [f"warning: {text}" for text in self.warnings]
@@ -442,6 +447,8 @@ class _Checker:
         flight, warn, verdict = first.flight, self._warnings.append, result.verdict
         if self._whole and (verdict.violation or not verdict.completed):
             why = why_no_landing(Evidence(flight, self._plan.limits), verdict)
+            if isinstance(self._system, CompanionProgram) and self._saw_nothing(flight):
+                why += f" {WHERE_TO_FLY}"
             self._faults.append(
                 f"your system does not land in clear air, on {self._map.name} without moving "
                 f"objects: {why} A search would report that again and again."
@@ -459,6 +466,8 @@ class _Checker:
                 f"with each command {self._diagnostics_example()}: the place that it takes for the "
                 "marker, the markers that it sees in the frame, what it does"
             )
+        elif self._saw_nothing(flight):
+            pass  # It had nothing to report.
         elif self._whole and not Evidence(flight).reports_anything:
             warn(
                 "its diagnostics never name a detection (Diagnostics.detections) or a target "
@@ -511,6 +520,11 @@ class _Checker:
             printed = _printed_text(self._output, lines=0 if crash.traceback else LAST_LINES)
             raise LandingSystemError(f"{crash.where}: {_last_place(flight)}: {what}{printed}")
         return _TimedFlight(flight, _cpu_s() - began)
+
+    def _saw_nothing(self, flight: Flight) -> bool:
+        """Whether the system looked at pictures, and the marker could be read in none of them."""
+        looked = flight.data_read is None or "image" in flight.data_read
+        return looked and not Evidence(flight).readable
 
     @contextlib.contextmanager
     def _keeping_output(self, keeps: str | None) -> Iterator[None]:

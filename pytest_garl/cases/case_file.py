@@ -405,7 +405,9 @@ FASTEST_MPS = 1000.0
 _OF_BODY = {"grade", "type", "objects", "interference_s", "speed_mps", "when", "window_s"} | {
     "untried"
 }
-_OF_CONDITIONS = {"conditions", "values", "largest", "largest_share", "unread", "untried"}
+_OF_CONDITIONS = {"conditions", "values", "largest", "largest_share", "unread", "untried"} | {
+    "placed"
+}
 _OF_SHRUNK = {
     "body": "# The adversary that it takes; the weaker, the worse.",
     "conditions": "# The conditions that it takes; the fewer, the worse.",
@@ -447,6 +449,7 @@ def severity_lines(severity: Severity, *, is_shrunk: bool) -> list[list[str]]:
                 f"largest = {quoted(severity.largest)}",
                 f"largest_share = {severity.largest_share!r}",
                 *_names("unread", severity.unread),
+                *(["placed = true  # it takes the marker's place too"] if severity.placed else []),
                 *untried,
             ]
         ]
@@ -480,6 +483,7 @@ def read_severity(top: Table) -> Severity:
             largest=table.string("largest"),
             largest_share=table.number("largest_share", low=0.0, high=1.0),
             unread=_read_names(table, "unread"),
+            placed=table.boolean("placed", default=False),
             untried=_read_names(table, "untried"),
         )
     table.refuse_unknown(_OF_BODY)

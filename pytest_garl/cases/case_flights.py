@@ -9,12 +9,18 @@ from pytest_garl.cases.case_request import CaseRequest, CaseResult, FailingScena
 from pytest_garl.cases.move_reduction import short_moves
 from pytest_garl.cases.prevention import collision_of, prevention_of
 from pytest_garl.cases.robustness import NEIGHBOURS, neighbours
-from pytest_garl.cases.simplification import removals, simplified
+from pytest_garl.cases.simplification import (
+    genome_of_scenario,
+    removals,
+    simplified,
+    value_simplifications,
+)
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.on_demand import FlyFunction
+from pytest_garl.execution.severity_of_flight import idle_groups
 from pytest_garl.flight.flight_file import load
-from pytest_garl.scenarios.conditions import unread_groups, without_groups
+from pytest_garl.scenarios.conditions import without_groups
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
@@ -93,6 +99,11 @@ class CaseFlights:
             without = (repair(simplified(each, way), map) for each in known for way in ways)
             if self._flown.isdisjoint(without):
                 names.append(name)
+        values = value_simplifications(scenario, genome_of_scenario(scenario, map))
+        for cause, steps in values.items():
+            without = (repair(step(each), map) for each in known for step in steps)
+            if cause not in names and self._flown.isdisjoint(without):
+                names.append(f"each value of {cause}")
         return tuple(names)
 
     def fly_live(self, scenario: Scenario) -> CompletedFlight:
@@ -213,14 +224,15 @@ class CaseFlights:
 
 
 def without_unread(request: CaseRequest, scenario: Scenario, flight: CompletedFlight) -> Scenario:
-    """Return a scenario without the conditions that change only data which was never read.
+    """Return a scenario without the conditions that cannot have acted.
 
-    ``flight`` is its flight.  What a system never reads cannot change what it does, so the other
-    scenario has the same flight; the assertion of a test may judge it in another way.
+    They change only data which was never read, or are events that did not strike.  ``flight`` is
+    its flight.  The other scenario has the same one; the assertion of a test may judge it in
+    another way.
     """
     if not flight.record.exists():
         return scenario
-    found = without_groups(scenario, unread_groups(scenario, load(flight.record).data_read))
+    found = without_groups(scenario, idle_groups(scenario, load(flight.record)))
     return found if request.fails(found, flight) else scenario
 
 

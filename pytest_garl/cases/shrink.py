@@ -79,7 +79,7 @@ def reset_and_bisect(trials: Trials, colliding_object: str) -> None:
         return _bisect(trials)
     needs_no_object = _reset(trials, steps.objects)
     _reset(trials, steps.conditions, needs_one=needs_no_object or not is_hit)
-    for values in value_simplifications(trials.best, trials.genome):
+    for values in value_simplifications(trials.best, trials.genome).values():
         _reset(trials, values, needs_one=True)
     return _bisect(trials)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from pytest_garl.scenarios.conditions import active_conditions, cause_of_key
+from pytest_garl.scenarios.conditions import ACT_ALONE, active_conditions, cause_of_key
 from pytest_garl.scenarios.genes import Genome, NuclearGene
 from pytest_garl.scenarios.genome_like import genome_like
 from pytest_garl.scenarios.groups import QUANTITIES
@@ -16,6 +16,7 @@ from pytest_garl.scenarios.story import STORY
 from pytest_garl.scenarios.validity import repair
 
 Simplification = Callable[[Scenario], Scenario]
+PLACE = "the marker's place"
 
 
 class Simplifications(NamedTuple):
@@ -60,7 +61,8 @@ def removals(
 ) -> dict[str, list[Simplification]]:
     """Return how to remove each object, and how to make each condition nominal, by name.
 
-    A condition may have several genes.  The marker's place and whoever was hit are not named.
+    A condition may have several genes.  Whoever was hit is not named, and the marker's place only
+    if nobody was.
     """
     found: dict[str, list[Simplification]] = {}
     for key, _ in scenario.genes:
@@ -73,25 +75,30 @@ def removals(
         cause = cause_of_key(gene.properties[0].key)
         if cause in active and any(scenario[key] != value for key, value in nominal.items()):
             found.setdefault(cause, []).append(_reset(nominal))
+    if scenario.has_moved_marker and not colliding_object:
+        found[PLACE] = [_reset(dict.fromkeys(MARKER_PLACE, 0.0))]
     return found
 
 
-def value_simplifications(scenario: Scenario, genome: Genome) -> list[list[Simplification]]:
-    """Return the ways to make single values nominal, for each condition with several.
+def value_simplifications(scenario: Scenario, genome: Genome) -> dict[str, list[Simplification]]:
+    """Return the ways to make single values nominal, for each condition with several, by name.
 
-    Values come with the mildest first.  Kinds, directions and times stay with them.
+    Values come with the mildest first.  Kinds and times stay with them, and directions that act
+    with them only.
     """
-    found = []
+    found = {}
     for gene in genome.genes:
         if gene.properties[0].key not in QUANTITIES:
             continue
         values = sorted(
             (_distance(scenario, item), item.key, item.nominal)
             for item in gene.properties
-            if QUANTITIES[item.key].has_harsher_end and scenario[item.key] != item.nominal
+            if QUANTITIES[item.key].has_harsher_end or item.key in ACT_ALONE
+            if scenario[item.key] != item.nominal
         )
         if len(values) > 1:
-            found.append([_reset({key: nominal}) for _, key, nominal in values])
+            cause = cause_of_key(values[0][1])
+            found[cause] = [_reset({key: nominal}) for _, key, nominal in values]
     return found
 
 

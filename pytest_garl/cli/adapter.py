@@ -39,6 +39,7 @@ class {adapter}:
 
     def step(self, observation: Observation) -> Command:
         """Answer a picture. The UAV stands on the ground at first, metres from the marker."""
+        # Delete these four lines if your stack takes off and flies there by itself.
         there_m = (*self.mission.gps_position_m, self.mission.search_altitude_m)
         self.is_there = self.is_there or math.dist(observation.position_m, there_m) < 1.0
         if not self.is_there:
@@ -46,6 +47,7 @@ class {adapter}:
 
         image_bgr = observation.image[:, :, ::-1].copy()
         altitude_m = float(observation.position_m[2])
+        # As a quaternion: pytest_garl.external.axes.turned_attitude, x, y, z, w of FRD in NED.
         roll_rad, pitch_rad, heading_rad = euler_of(observation.attitude)  # of aviation
         north_mps, east_mps, down_mps = turned(observation.velocity_mps)
         answer = self.stack.update(  # <-

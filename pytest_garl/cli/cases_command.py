@@ -285,7 +285,8 @@ def shrink(project: _Project, file: Path, flights: int, workers: int, *, as_it_f
     """Shrink a case further, from its own record.
 
     The command replaces the file only by a case that is no worse in any respect (objects, genes,
-    moves, size, neighbours that fail) and better in at least one.
+    moves, size, neighbours that fail) and better in at least one. The new file is named by what it
+    holds, so it may have another name.
     """
     from pytest_garl.cases.reshrink import NOTHING_SIMPLER, shrink_case
     from pytest_garl.plugin.case_tests import case_setup

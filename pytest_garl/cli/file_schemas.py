@@ -271,6 +271,7 @@ def _severity() -> Schema:
             "largest": _text("the condition nearest to its limit"),
             "largest_share": _number("how near", 0, 1),
             "unread": names,
+            "placed": _flag("whether it takes the marker's place too"),
             **untried,
         },
         required=("conditions", "largest", "largest_share"),

@@ -45,10 +45,12 @@ import math
 import pytest
 from pytest_garl import Camera, CompanionProgram, MarkerSpec
 
-# How the program is started, the Python in which it runs, and its camera.
+# How the program is started, the Python in which it runs, and its camera. In the command may stand
+# what it is told: {{north_m}} {{east_m}} or {{lat_deg}} {{lon_deg}}, about where the marker is;
+# {{search_altitude_m}}, {{marker_id}}, {{marker_side_m}}.
 lander = CompanionProgram(
-    {words},{python}
-    camera=Camera(width_px=640, height_px=480, field_of_view_rad=math.radians(90)),
+    {words},{python}  # <-
+    camera=Camera(width_px=640, height_px=480, field_of_view_rad=math.radians(90)),  # <-
 )
 """
 MARKED = """\
@@ -58,7 +60,7 @@ WITH_MARKER = """\
 pytestmark = pytest.mark.garl(
     system={system},
     maps=["court", "lawn"],
-    marker=MarkerSpec(dictionary="DICT_5X5_50", id=0, side_m=1.5),  # yours
+    marker=MarkerSpec(dictionary="DICT_5X5_50", id=0, side_m=1.5),  # <-
 )
 """
 TESTS = """\

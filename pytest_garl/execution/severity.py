@@ -37,8 +37,9 @@ class Severity:
     Of conditions: ``conditions`` are active, objects that are there included; ``values`` say for
     each which of its values are not nominal, or how many; ``largest_share`` (0..1) is how far the
     strongest lies from nominal, as a share of all that can be flown; ``largest`` says it in words.
-    ``unread`` are those of the conditions that change only data which the landing system never
-    read: no text names them.
+    ``unread`` are those of the conditions that cannot have acted: they change only data which the
+    landing system never read, or are events that did not strike.  No text names them.  ``placed``
+    says that the marker lies elsewhere than at the map's coordinate.
 
     ``untried`` names conditions and objects of a saved case of which shrinking did not try whether
     the violation needs them.
@@ -57,6 +58,7 @@ class Severity:
     largest: str = ""
     largest_share: float = 0.0
     unread: tuple[str, ...] = ()
+    placed: bool = False
     untried: tuple[str, ...] = ()
 
     @property
@@ -152,15 +154,16 @@ class Severity:
     def _conditions_text(self) -> str:
         acting = self.acting
         names, count = [name for name, _ in acting], len(acting)
+        place = " at this place of the marker" if self.placed else ""
         if not count:
-            return "nothing unusual"
+            return f"nothing unusual{place and ' but the place of the marker'}"
         if count == 1:
             value = self._value_of_one(acting[0][1])
-            return f"{names[0]} alone{f', {value}' if value else ''}"
+            return f"{names[0]}{place or ' alone'}{f', {value}' if value else ''}"
         if count > MOST_LISTED:
             more = f"{count - MOST_LISTED} more"
-            return f"{count} conditions: {', '.join([*names[:MOST_LISTED], more])}"
-        return f"{count} conditions: {', '.join(_named(*each) for each in acting)}"
+            return f"{count} conditions{place}: {', '.join([*names[:MOST_LISTED], more])}"
+        return f"{count} conditions{place}: {', '.join(_named(*each) for each in acting)}"
 
     def to_json(self, *, took: bool) -> dict[str, Any]:
         """Return plain values for a report: its text, and the facts of a body or of conditions.
@@ -182,6 +185,7 @@ class Severity:
             "largest": self.largest,
             "largest_share": self.largest_share,
             "unread": list(self.unread),
+            "placed": self.placed,
         }
         facts = {"": {}, "body": body, "conditions": conditions}[self.about]
         if self.about:

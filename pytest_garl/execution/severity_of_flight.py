@@ -25,6 +25,8 @@ RECENT_S = 3.0
 """The speed of a body is its highest within this time before the contact."""
 DID_NOT_STRIKE = "did not strike"
 """Said of an event for whose moment the flight was too short."""
+DID_NOT_BEGIN = "had not begun"
+"""Said of an NPC whose story begins after the flight's end."""
 CENTIMETRES = 2
 """Digits of lengths of time and of speeds."""
 
@@ -45,8 +47,8 @@ def severity_of(
     if verdict.violation_type == "IV" and flight.contacts:
         return _of_body(flight, flight.contacts[-1], scenario, len(present), npcs)
     conditions = [_at_its_moment(each, flight, scenario) for each in active_conditions(scenario)]
-    unread = unread_groups(scenario, flight.data_read)
-    acting = [each for each in conditions if each.cause not in unread]
+    idle = idle_groups(scenario, flight)
+    acting = [each for each in conditions if each.cause not in idle]
     strongest = max(acting, key=lambda each: each.share, default=None)
     return Severity(
         about="conditions",
@@ -58,8 +60,24 @@ def severity_of(
         largest=strongest.words if strongest else "",
         # Of all conditions, so that what a system reads does not change which scenarios are bred.
         largest_share=max((each.share for each in conditions), default=0.0),
-        unread=unread,
+        unread=idle,
+        placed=scenario.has_moved_marker,
     )
+
+
+def idle_groups(scenario: Scenario, flight: Flight) -> tuple[str, ...]:
+    """Return the groups that cannot have acted in the flight of a scenario.
+
+    They change only data that was never read, or are events that did not strike.
+    """
+    moments = RecordedMoments(flight)
+    active = {each.cause for each in active_conditions(scenario)}
+    late = (
+        name
+        for name in EVENTS
+        if name in active and Beginning(scenario, name, moments).time_s >= flight.elapsed_s
+    )
+    return tuple(dict.fromkeys((*unread_groups(scenario, flight.data_read), *late)))
 
 
 def _of_body(
@@ -106,7 +124,7 @@ def _while_covered(flight: Flight, scenario: Scenario, time_s: float) -> str:
 
 def _comes(flight: Flight, scenario: Scenario, name: str, npcs: PolicySpec) -> str:
     when = _when_it_comes(flight, scenario, name, npcs)
-    return f"comes {when}" if when else ""
+    return f"comes {when}" if when and when != DID_NOT_BEGIN else when
 
 
 def _when_it_comes(flight: Flight, scenario: Scenario, name: str, npcs: PolicySpec) -> str:
@@ -118,6 +136,8 @@ def _when_it_comes(flight: Flight, scenario: Scenario, name: str, npcs: PolicySp
     if story is None or npcs.name not in READ_STORIES or story.grade == "hostile":
         return ""
     begins_s = story.begins_s(RecordedMoments(flight).of_npc(name))
+    if begins_s >= flight.elapsed_s:
+        return DID_NOT_BEGIN
     return _while_covered(flight, scenario, begins_s)
 
 

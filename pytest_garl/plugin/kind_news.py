@@ -33,6 +33,7 @@ class KindNews:
         self._looked = 0.0
         self._found: set[tuple[str, str]] = set()
         self._shrunk: set[str] = set()
+        self._tells_saving = False
         self._told: set[str] = set()
         self._kinds, self._time_left = NewKinds(run), TimeLeft(run)
         self._tells_time = run.flight_s is None
@@ -89,8 +90,10 @@ class KindNews:
                 text = _shrunk(request, result)
                 # Another cause of a kind may have shrunk to the same case.
                 if text not in self._told:
+                    saved = result.case is not None and not self._tells_saving
+                    self._tells_saving = self._tells_saving or saved
                     self._told.add(text)
-                    yield text
+                    yield f"{text} (its case is saved when the run ends)" if saved else text
 
 
 def news_of(run: Run, config: pytest.Config) -> KindNews:

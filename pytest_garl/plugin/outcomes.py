@@ -36,7 +36,7 @@ class Reason(Enum):
     NOT_REPEATED = "the violation did not show again"
     EDGE = "not all neighbours of the case fail, so it gates nothing"
     KNOWN_CASE = "the case is open and known"
-    NOT_PREVENTABLE_CASE = "the case is known, and no landing system could prevent it"
+    NOT_PREVENTABLE_CASE = "no landing system could prevent it with this camera"
     NEW_CASE = "the case is neither committed nor accepted"
     FAILS_AGAIN = "the case was fixed"
     FAILS_DIFFERENTLY = "the case has another signature"
@@ -216,14 +216,17 @@ def _failed_search(facts: FailedItem) -> Decision | Need:
 
 
 def _failed_case(facts: FailedItem, case: CaseState) -> Decision:
-    """Let a known open case fail as it did before, and a fixed one not at all."""
+    """Let a known open case fail as it did before, and a fixed one not at all.
+
+    A case that gates nothing need not be known.
+    """
     same = facts.signature == case.signature
     if case.reason == "edge" and (same or not (facts.user_property or facts.crashed)):
         return _xfail(Reason.EDGE)
     open_as_saved = case.status == "open" and same
     # Such a collision may show in another phase; that excuses nothing else.
     not_preventable = bool(case.reason) and facts.signature.startswith(_MOVING_BODY)
-    if (open_as_saved or not_preventable) and case.accepted:
+    if (open_as_saved or not_preventable) and (case.accepted or case.reason):
         return _xfail(Reason.NOT_PREVENTABLE_CASE if case.reason else Reason.KNOWN_CASE)
     if facts.user_property and not same and facts.expected_by:
         return _xfail(Reason.EXPECTED)

@@ -26,8 +26,10 @@ LIGHT_GROUP = "light"
 TOLD_GROUP, TOLD_ERROR = "told", "told.error_m"
 NOON = 0.5
 """The nominal position of the sun."""
-MOST_NAMED = 2
+MOST_NAMED = 3
 """More values of one cause than these are counted and not named."""
+ACT_ALONE = ("pad.yaw_deg",)
+"""Directions that may act without any other value of their cause."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +38,8 @@ class ActiveCondition:
 
     ``share`` (0..1) is how far its strongest value lies from nominal, as a share of all that can be
     flown; 0 if its values are only kinds, directions and times.  ``words`` say that value.
-    ``values`` say all that are not nominal; directions and times only if nothing else is there.
+    ``values`` say all that are not nominal; directions and times only if nothing else is there, or
+    if they may act alone.
     ``when`` says for an event that waits for a moment of the landing when it begins.
     """
 
@@ -48,7 +51,7 @@ class ActiveCondition:
 
     @property
     def named(self) -> str:
-        """Its values in words, ``dirt 30 %``; more than two are counted, ``5 values``."""
+        """Its values in words, ``dirt 30 %``; more than three are counted, ``5 values``."""
         counted = f"{len(self.values)} values"
         text = counted if len(self.values) > MOST_NAMED else ", ".join(self.values)
         return f"{self.when}, {text}" if self.when else text
@@ -69,7 +72,9 @@ def active_conditions(scenario: Scenario) -> tuple[ActiveCondition, ...]:
             when = _when(scenario, name)
             found += [
                 dataclasses.replace(each, when=when)
-                for each in _condition(name, list(_values(scenario, group)))
+                for each in _condition(
+                    name, list(_values(scenario, group)), _alone(scenario, group)
+                )
             ]
     return tuple(found)
 
@@ -117,11 +122,13 @@ def without_groups(scenario: Scenario, names: Collection[str]) -> Scenario:
     return scenario.replace(nominal) if nominal else scenario
 
 
-def _condition(cause: str, values: list[tuple[float, str]]) -> list[ActiveCondition]:
+def _condition(
+    cause: str, values: list[tuple[float, str]], alone: Collection[str] = ()
+) -> list[ActiveCondition]:
     if not values:
         return []
     share, words = max(values, key=lambda each: each[0])
-    strong = tuple(text for part, text in values if part > 0)
+    strong = tuple(text for part, text in values if part > 0 or text in alone)
     share = round(min(1.0, share), 4)
     return [ActiveCondition(cause=cause, share=share, words=words, values=strong or (words,))]
 
@@ -145,6 +152,12 @@ def _values(scenario: Scenario, group: Group) -> Iterator[tuple[float, str]]:
         value = scenario[each.key]
         if value != each.nominal and each.name != "after":
             yield _share(each, value), _value_in_words(each, value)
+
+
+def _alone(scenario: Scenario, group: Group) -> tuple[str, ...]:
+    """Return the words of directions that may act without any other value."""
+    directions = [each for each in group.quantities if each.key in ACT_ALONE]
+    return tuple(_value_in_words(each, scenario[each.key]) for each in directions)
 
 
 def _share(quantity: Quantity, value: float) -> float:

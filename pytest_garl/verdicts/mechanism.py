@@ -25,6 +25,10 @@ LOST_AFTER_S = 3.0
 """A marker counts as lost if it was not readable for this long before the end."""
 RECENT_S = 0.5
 """A marker that was in view so long ago is in view."""
+LAST_S = 60.0
+"""Of this time before the end it is told how often the marker could be read."""
+ALL_SHARE = 0.95
+"""A marker that could be read in so many pictures was in view to the end."""
 RESERVE_SHARE = 0.15
 """A landing that is given up in this last share of the time limit is given up for want of time."""
 UNRANGED_S = 1.0
@@ -213,11 +217,12 @@ def _no_landing_cause(evidence: Evidence, end: str) -> tuple[ViolationType, str,
     if not readable:
         # A detector may read a frame that a good one reads with less than one half.
         view = "readable" if evidence.last_report_s(at_s) is None else "well readable"
-        return "II", "II:never-seen", f"{end}{when}; the marker was never {view}.{report}"
+        text = f"{end}{when}; the marker was never {view} from where it flew.{report}"
+        return "II", "II:never-seen", text
     last = readable[-1]
     lost = at_s - last > LOST_AFTER_S
     if flight.outcome == "not_landed" and not lost:
-        text = f"Not landed although the marker was in view to the end.{report}"
+        text = f"Not landed although the marker was in view{_share_text(evidence, at_s)}.{report}"
         return "late", f"late:not-landed:{phase}", text
     view = f"the marker was last readable at {last:.1f} s" if lost else "the marker was in view"
     if flight.outcome == "gave_up" and at_s >= (1 - RESERVE_SHARE) * evidence.limits.time_s:
@@ -228,8 +233,8 @@ def _no_landing_cause(evidence: Evidence, end: str) -> tuple[ViolationType, str,
     seen_s = len(readable) * evidence.frame_s
     ago = f", last {at_s - last:.1f} s before" if at_s - last > RECENT_S else ""
     text = (
-        f"Gave up{when} with the marker in view{ago}; it had been readable for {seen_s:.1f} s."
-        f"{report}"
+        f"Gave up{when} with the marker in view{ago}; it had been readable for {seen_s:.1f} s in "
+        f"all.{report}"
     )
     return "II", f"II:gave-up-in-sight:{phase}", text
 
@@ -242,8 +247,20 @@ def _report_text(evidence: Evidence) -> str:
     if last is not None:
         # A target may be a memory: it is no sighting.
         return f" Its place was the system's target up to {last:.1f} s."
-    other = " The system reported other places, never the marker's."
-    return other if evidence.reports_anything else ""
+    if evidence.reports_anything:
+        return " The system reported other places, never the marker's."
+    has_diagnostics = any(step.diagnostics for step in evidence.flight.steps)
+    return " The system reported no detection and no target." if has_diagnostics else ""
+
+
+def _share_text(evidence: Evidence, at_s: float) -> str:
+    """Return in how many of the last pictures a marker in view could be read, if not in all."""
+    latest = [s.time_s for s in evidence.flight.steps if at_s - LAST_S <= s.time_s <= at_s]
+    readable = [s for s in evidence.readable_until(at_s) if s.time_s >= at_s - LAST_S]
+    share = len(readable) / len(latest) if latest else 1.0
+    if share > ALL_SHARE:
+        return " to the end"
+    return f": readable in {100 * share:.0f} % of the pictures of the last {LAST_S:.0f} s"
 
 
 def _unranged_text(evidence: Evidence) -> str:
@@ -264,11 +281,14 @@ def _unranged_text(evidence: Evidence) -> str:
 
 
 def _opportunity_text(evidence: Evidence) -> str:
-    """Return for how long a nominal landing could have read the marker."""
+    """Return for how long a nominal landing could have read the marker: a search, a descent."""
     if not evidence.flight.nominal_views:
         return ""
     readable_s = evidence.expected_readable_s
-    return f" A nominal landing could have read the marker for {readable_s:.0f} s."
+    return (
+        " A landing that searches and then descends above the marker could have read it for "
+        f"{readable_s:.0f} s."
+    )
 
 
 def _missed(

@@ -216,6 +216,7 @@ def test_conditions_that_no_flight_tried_to_remove_are_named() -> None:
         flight=flights.live_flight(VIOLATING_SCENARIO),
     )
     everything = {each.cause for each in active_conditions(VIOLATING_SCENARIO)} | {*OBJECT_NAMES}
+    everything |= {"the marker's place"}
     assert {*flights.untried(failing)} == everything
     # Without fog it does not fail, and without one object neither: both were tried.
     assert not flights.fails_live(

@@ -73,7 +73,7 @@ def test_a_script_gets_a_test_that_starts_it(folder: Path) -> None:
     assert done.exit_code == 0, done.output
     written = (folder / "tests" / "test_my_lander.py").read_text()
     assert """CompanionProgram(\n    "python 'my lander.py'",\n    folder="..",\n""" in written
-    assert '    python="venv/bin/python",\n    camera=Camera(' in written
+    assert '    python="venv/bin/python",  # <-\n    camera=Camera(' in written
     assert "system=lander" in written
     assert "test_completes_the_mission[court-g00-s00]" in collected(folder)
 

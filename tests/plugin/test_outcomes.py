@@ -107,7 +107,7 @@ def test_search_item_fails_once_per_repeating_violation(
         (failed(reason="unpreventable", signature=PERSON), "xfailed", Reason.NOT_PREVENTABLE_CASE),
         (failed(reason="unpreventable", signature="I:nothing:seen"), "failed", None),
         (failed(reason="sensor-limited", signature="II:never-seen"), "failed", None),
-        (failed(reason="unpreventable", accepted=False), "failed", Reason.NEW_CASE),
+        (failed(reason="unpreventable", accepted=False), "xfailed", Reason.NOT_PREVENTABLE_CASE),
         (failed(reason="unpreventable", signature="V:ValueError", crashed=True), "failed", None),
         (failed(reason="unpreventable", signature=OWN, user_property=True), "failed", None),
         (failed(signature=OWN, user_property=True), "failed", Reason.FAILS_DIFFERENTLY),

@@ -52,12 +52,19 @@ def test_direction_has_no_harsher_end() -> None:
     assert (turned.cause, turned.share) == ("light", 0.0)
 
 
-def test_condition_names_two_values_and_counts_more() -> None:
+def test_condition_names_three_values_and_counts_more() -> None:
     camera = {"camera.dirt_percent": 30.0, "camera.exposure_ms": 10.0}
-    (two,) = active_conditions(NOMINAL.replace(camera))
-    assert two.named == "exposure 10 ms, dirt 30 %"
-    (three,) = active_conditions(NOMINAL.replace(camera | {"camera.mounting_yaw_deg": 3.0}))
-    assert three.named == "3 values"
+    camera |= {"camera.mounting_yaw_deg": 3.0}
+    (three,) = active_conditions(NOMINAL.replace(camera))
+    assert three.named == "mounting yaw 3 degrees, exposure 10 ms, dirt 30 %"
+    (four,) = active_conditions(NOMINAL.replace(camera | {"camera.mounting_roll_deg": 3.0}))
+    assert four.named == "4 values"
+
+
+def test_a_pad_that_lies_turned_is_named_beside_its_wear() -> None:
+    (pad,) = active_conditions(NOMINAL.replace({"pad.yaw_deg": -27.0, "pad.worn_percent": 18.0}))
+    assert pad.named == "yaw -27 degrees, worn 18 %"
+    assert pad.words == "worn 18 %"
 
 
 @pytest.mark.parametrize(

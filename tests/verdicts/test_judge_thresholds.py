@@ -90,7 +90,11 @@ def test_a_marker_readable_in_the_last_three_seconds_was_seen(seen_s: float, sig
 @pytest.mark.parametrize(
     ("last_s", "signature", "words"),
     [
-        (27.0, "late:not-landed:approach", "although the marker was in view to the end"),
+        (
+            27.0,
+            "late:not-landed:approach",
+            "was in view: readable in 67 % of the pictures of the last 60 s",
+        ),
         (26.9, "II:lost:approach", "the marker was last readable at 26.9 s"),
     ],
 )
