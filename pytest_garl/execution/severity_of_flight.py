@@ -123,22 +123,25 @@ def _while_covered(flight: Flight, scenario: Scenario, time_s: float) -> str:
 
 
 def _comes(flight: Flight, scenario: Scenario, name: str, npcs: PolicySpec) -> str:
+    begins_s = _begins_s(flight, scenario, name, npcs)
+    if begins_s is not None and begins_s >= flight.elapsed_s:
+        return DID_NOT_BEGIN
     when = _when_it_comes(flight, scenario, name, npcs)
-    return f"comes {when}" if when and when != DID_NOT_BEGIN else when
+    return f"comes {when}" if when else ""
+
+
+def _begins_s(flight: Flight, scenario: Scenario, name: str, npcs: PolicySpec) -> float | None:
+    """Return when the story of a body begins; None for one without, and if nobody follows it."""
+    story = story_of(scenario, name)
+    if story is None or npcs.name not in READ_STORIES or story.grade == "hostile":
+        return None
+    return story.begins_s(RecordedMoments(flight).of_npc(name))
 
 
 def _when_it_comes(flight: Flight, scenario: Scenario, name: str, npcs: PolicySpec) -> str:
-    """Return ``while the marker is covered`` if a body comes then; empty for one without a story.
-
-    A policy that reads no stories moves it as it likes.
-    """
-    story = story_of(scenario, name)
-    if story is None or npcs.name not in READ_STORIES or story.grade == "hostile":
-        return ""
-    begins_s = story.begins_s(RecordedMoments(flight).of_npc(name))
-    if begins_s >= flight.elapsed_s:
-        return DID_NOT_BEGIN
-    return _while_covered(flight, scenario, begins_s)
+    """Return ``while the marker is covered`` if a body comes then."""
+    begins_s = _begins_s(flight, scenario, name, npcs)
+    return "" if begins_s is None else _while_covered(flight, scenario, begins_s)
 
 
 def _speed_mps(hit: ObjectRecord, until_s: float) -> float:

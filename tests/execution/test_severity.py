@@ -155,6 +155,23 @@ def test_a_body_that_comes_while_the_marker_is_covered_says_so() -> None:
     assert hidden.to_json(took=True)["when"] == hidden.when
 
 
+@pytest.mark.parametrize(
+    ("severity", "text"),
+    [
+        (FOG, "fog at this place of the marker, visibility 11 m"),
+        (CAMERA, "2 conditions at this place of the marker: camera (dirt 15 %), person-1"),
+        (
+            Severity(about="conditions"),
+            "nothing unusual but the place of the marker",
+        ),
+    ],
+)
+def test_what_takes_the_place_of_the_marker_too_is_not_alone(severity: Severity, text: str) -> None:
+    placed = dataclasses.replace(severity, placed=True)
+    assert placed.text == text
+    assert placed.unusual == severity.unusual
+
+
 def test_what_shrinking_did_not_try_is_named() -> None:
     one = dataclasses.replace(LIGHT_AND_DEPTH, untried=("depth",))
     assert one.text == (

@@ -166,6 +166,9 @@ def test_event_that_strikes_while_the_marker_is_covered_says_so(
     found = severity(ALONE.without("person-1").replace(COVER | values), verdict=lost)
     named = dict(zip(found.conditions, found.values, strict=True))
     assert named == {"outage": words, "cover": "lasts 3 s, share 100 %"}
+    # What did not strike cannot have acted, and no text names it.
+    assert found.unread == (("outage",) if "did not strike" in words else ())
+    assert ("outage" in found.unusual) == ("did not strike" not in words)
 
 
 def test_other_violation_says_its_conditions_and_its_objects() -> None:
@@ -174,6 +177,17 @@ def test_other_violation_says_its_conditions_and_its_objects() -> None:
     assert severity(foggy, verdict=lost).text == "2 conditions: fog (visibility 20 m), person-1"
     alone = severity(foggy.without("person-1"), verdict=lost)
     assert (alone.text, alone.largest_share) == ("fog alone, visibility 20 m", 0.5)
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "unusual"), [(60.0, "person-1 (had not begun)"), (0.0, "person-1")]
+)
+def test_an_npc_whose_story_begins_after_the_end_had_not_begun(
+    delay_s: float, unusual: str
+) -> None:
+    lost = flight_result("II:lost", outcome="gave_up", primary="time", violation_type="II").verdict
+    later = with_story(ALONE, phase=0.0, delay_s=delay_s)
+    assert severity(later, verdict=lost).unusual == unusual
 
 
 @pytest.mark.sim

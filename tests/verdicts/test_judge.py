@@ -232,11 +232,16 @@ def test_reports_of_the_system_change_the_text_and_never_the_type() -> None:
     boasts = dataclasses.replace(silent, steps=(step(29.0, marker=CLEAR, detected=here),))
     raves = dataclasses.replace(silent, steps=(step(29.0, marker=CLEAR, detected=there),))
     remembers = dataclasses.replace(silent, steps=(step(29.0, marker=CLEAR, target=here),))
-    verdicts = [judge(each, Limits()) for each in (silent, boasts, raves, remembers)]
+    mute = dataclasses.replace(
+        silent, steps=tuple(dataclasses.replace(each, diagnostics=None) for each in silent.steps)
+    )
+    verdicts = [judge(each, Limits()) for each in (silent, boasts, raves, remembers, mute)]
     assert {each.signature for each in verdicts} == {"II:gave-up-in-sight:approach"}
     assert "The system last reported it at 29.0 s." in verdicts[1].story
     assert "The system reported other places" in verdicts[2].story
     assert "Its place was the system's target up to 29.0 s." in verdicts[3].story
+    assert "The system reported no detection and no target." in verdicts[0].story
+    assert "reported" not in verdicts[4].story
 
 
 def test_the_target_is_compared_without_the_error_of_the_position() -> None:
