@@ -412,6 +412,7 @@ _OF_SHRUNK = {
     "body": "# The adversary that it takes; the weaker, the worse.",
     "conditions": "# The conditions that it takes; the fewer, the worse.",
 }
+_PLACED = "placed = true  # the marker lies beside the map's coordinate"
 _NOT_SHRUNK = "# Unusual in the flight that was found; the case is not shrunk."
 
 
@@ -449,7 +450,7 @@ def severity_lines(severity: Severity, *, is_shrunk: bool) -> list[list[str]]:
                 f"largest = {quoted(severity.largest)}",
                 f"largest_share = {severity.largest_share!r}",
                 *_names("unread", severity.unread),
-                *(["placed = true  # it takes the marker's place too"] if severity.placed else []),
+                *([_PLACED] if severity.placed else []),
                 *untried,
             ]
         ]

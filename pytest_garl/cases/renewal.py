@@ -23,9 +23,16 @@ from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.local_pool import temporary_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.reference import Reference, reference_to, simulator_sha256
+from pytest_garl.execution.severity import Severity
+from pytest_garl.execution.severity_of_flight import severity_of
 from pytest_garl.execution.sources import data_files, sources_sha256
+from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
+from pytest_garl.npcs.domain_policy import READ_STORIES
+from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.verdicts.verdict import Verdict
 
 RenewalResult = Literal["renewed", "renamed", "current", "fixed", "not renewed"]
 
@@ -134,14 +141,15 @@ def _import_folder(case: Case, root: Path) -> Path:
 
 def _renewed(order: _Order) -> Callable[[FlyFunction], Renewal]:
     def fly(fly: FlyFunction) -> Renewal:
-        return renewal_by(
-            order.path, order.case, order.sources, fly(order.job, order.case.scenario)
-        )
+        flown = fly(order.job, order.case.scenario)
+        return renewal_by(order.path, order.case, order.sources, flown, order.job.load_map())
 
     return fly
 
 
-def renewal_by(path: Path, case: Case, sources: SourceHashes, flight: CompletedFlight) -> Renewal:
+def renewal_by(
+    path: Path, case: Case, sources: SourceHashes, flight: CompletedFlight, map: Map
+) -> Renewal:
     """Return what becomes of a case that was flown again."""
     result, recorded = flight.result, case.evidence.trajectory_sha256
     if result.inconclusive:
@@ -166,10 +174,24 @@ def renewal_by(path: Path, case: Case, sources: SourceHashes, flight: CompletedF
                 "its flight is the recorded one to the byte, but today's verdict finds no "
                 f"violation in it: delete it, if `garl cases replay {path}` agrees",
             )
-        violation = violation_in(result.verdict, record, case.severity, is_shrunk=case.is_shrunk)
-        renewed = dataclasses.replace(renewed, violation=violation)
+        severity = _severity_of(case, record, result.verdict, map)
+        violation = violation_in(result.verdict, record, severity, is_shrunk=case.is_shrunk)
+        renewed = dataclasses.replace(renewed, violation=violation, severity=severity)
     renamed = renewed.id != case.id or renewed.violation.signature != case.violation.signature
     return Renewal(path=path, result="renamed" if renamed else "renewed", before=case, case=renewed)
+
+
+def _severity_of(case: Case, flight: Flight | None, verdict: Verdict, map: Map) -> Severity:
+    """Return what a case takes in today's words, if that are conditions.
+
+    What moves a body is in its own file, which need not be there any more.
+    """
+    if flight is None or case.severity.about != "conditions" or case.policy not in READ_STORIES:
+        return case.severity
+    found = severity_of(flight, verdict, case.scenario, map, policy_spec(case.policy))
+    if found is None or found.about != "conditions":
+        return case.severity
+    return dataclasses.replace(found, untried=case.severity.untried)
 
 
 def _difference(path: Path, case: Case, flight: CompletedFlight) -> str:

@@ -148,8 +148,9 @@ def saved_lines(run: Run, config: pytest.Config) -> list[str]:
         lines.append(" \\\n        ".join(["    git apply", *patches]))
     elif files:
         hint = (
-            "New cases fail until they are fixed, committed, or accepted with `garl cases accept "
-            "FILE`. `garl cases show FILE` says more about a case."
+            "New cases that gate fail until they are fixed, committed, or accepted with `garl "
+            "cases accept FILE`. `garl cases show FILE` says more about a case, and `garl film "
+            "FILE` shows it."
         )
         lines.append(wrapped(hint, width))
     shrink = None if run.options.shrink_capped else run.options.shrink
