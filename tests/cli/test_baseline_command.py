@@ -119,7 +119,7 @@ def test_equal_options_save_equal_bytes_and_scenario_prints_one_scenario(
     save = ("baseline", "save", "--system=stack.system:Lander", *TINY, "--count=4")
     first = garl(*save, "--out=one/base.toml")
     assert first.exit_code == 0, first.output
-    assert "Lander-lawn: 4 flown; limits 0.75 m, 120 s, " in first.output
+    assert "Lander-lawn: 4 flown; limits distance 0.75 m, time 120 s, " in first.output
     garl(*save, "--out=two.toml", "--workers=2")
     assert Path("two.toml").read_bytes() == Path("one/base.toml").read_bytes()
     (saved,) = load_baseline(Path("two.toml")).sets

@@ -211,7 +211,7 @@ def test_gate_refuses_to_compare_other_limits(saved: pytest.Pytester) -> None:
     result = run(saved)
     result.assert_outcomes(failed=1, skipped=3)
     result.stdout.fnmatch_lines(
-        ["*gate FAILED: no fair comparison, limits: saved with *, 60 s, *, found *, 120 s, *"]
+        ["*gate FAILED: no fair comparison, limits: *, time 60 s, *, found *, time 120 s, *"]
     )
 
 
