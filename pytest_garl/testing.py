@@ -466,9 +466,7 @@ class _Checker:
                 f"with each command {self._diagnostics_example()}: the place that it takes for the "
                 "marker, the markers that it sees in the frame, what it does"
             )
-        elif self._saw_nothing(flight):
-            pass  # It had nothing to report.
-        elif self._whole and not Evidence(flight).reports_anything:
+        elif self._whole and not (Evidence(flight).reports_anything or self._saw_nothing(flight)):
             warn(
                 "its diagnostics never name a detection (Diagnostics.detections) or a target "
                 "(Diagnostics.target_m)"

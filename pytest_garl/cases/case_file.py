@@ -405,7 +405,7 @@ FASTEST_MPS = 1000.0
 _OF_BODY = {"grade", "type", "objects", "interference_s", "speed_mps", "when", "window_s"} | {
     "untried"
 }
-_OF_CONDITIONS = {"conditions", "values", "largest", "largest_share", "unread", "untried"} | {
+_OF_CONDITIONS = {"conditions", "values", "largest", "largest_share", "idle", "untried"} | {
     "placed"
 }
 _OF_SHRUNK = {
@@ -449,7 +449,7 @@ def severity_lines(severity: Severity, *, is_shrunk: bool) -> list[list[str]]:
                 *([f"values = [{values}]"] if severity.values else []),
                 f"largest = {quoted(severity.largest)}",
                 f"largest_share = {severity.largest_share!r}",
-                *_names("unread", severity.unread),
+                *_names("idle", severity.idle),
                 *([_PLACED] if severity.placed else []),
                 *untried,
             ]
@@ -483,7 +483,7 @@ def read_severity(top: Table) -> Severity:
             values=values,
             largest=table.string("largest"),
             largest_share=table.number("largest_share", low=0.0, high=1.0),
-            unread=_read_names(table, "unread"),
+            idle=_read_names(table, "idle"),
             placed=table.boolean("placed", default=False),
             untried=_read_names(table, "untried"),
         )

@@ -67,13 +67,13 @@ class CaseFlights:
         """Return what the objects did in the live flight of a scenario."""
         return recorded_behaviour(self._live[scenario], scenario, self.map)
 
-    def without_unread(self, scenario: Scenario) -> Scenario:
+    def without_idle(self, scenario: Scenario) -> Scenario:
         """Return a violation of the search without the conditions whose data was never read.
 
         Its flight is the same, so nothing is flown.
         """
         flight = self._live[scenario]
-        found = without_unread(self.request, scenario, flight)
+        found = without_idle(self.request, scenario, flight)
         if found != scenario:
             self._live[found] = flight
             self._of_search.add(found)
@@ -223,7 +223,7 @@ class CaseFlights:
         return self._fly(job, scenario)
 
 
-def without_unread(request: CaseRequest, scenario: Scenario, flight: CompletedFlight) -> Scenario:
+def without_idle(request: CaseRequest, scenario: Scenario, flight: CompletedFlight) -> Scenario:
     """Return a scenario without the conditions that cannot have acted.
 
     They change only data which was never read, or are events that did not strike.  ``flight`` is

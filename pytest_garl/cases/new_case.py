@@ -12,7 +12,7 @@ from pytest_garl.cases.case import (
     Prevention,
     Violation,
 )
-from pytest_garl.cases.case_flights import recorded_behaviour, without_unread
+from pytest_garl.cases.case_flights import recorded_behaviour, without_idle
 from pytest_garl.cases.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.cases.description import describe
 from pytest_garl.cases.removed import Removed
@@ -41,7 +41,7 @@ def case_without_flights(request: CaseRequest) -> CaseResult:
         )
     origin = request.simplest
     flight = dict(request.violations)[origin]
-    scenario = without_unread(request, origin, flight)
+    scenario = without_idle(request, origin, flight)
     failing = FailingScenario(
         origin=origin,
         scenario=scenario,

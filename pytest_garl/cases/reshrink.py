@@ -18,7 +18,7 @@ from pytest_garl.cases.case_flights import (
     ESCAPE_FLIGHTS,
     CaseFlights,
     find_colliding_object,
-    without_unread,
+    without_idle,
 )
 from pytest_garl.cases.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.cases.investigation import simplest_robust, with_shorter_record
@@ -128,7 +128,7 @@ class CaseReshrinker:
             return flights.result(None, NOT_REPRODUCED)
         if flights.request.signature != case.ending:
             return flights.result(self._replacement(saved, flights.prevention(saved)))
-        simpler = self._without_unread(saved)
+        simpler = self._without_idle(saved)
         # A crossing is alone, careless and as slow as usual; its entry would lose its window.
         is_crossing = case.severity.window_s is not None
         better = None
@@ -167,9 +167,9 @@ class CaseReshrinker:
             window_s=case.severity.window_s,
         )
 
-    def _without_unread(self, saved: FailingScenario) -> FailingScenario:
-        """Return the failure without the conditions whose data was never read: the same flight."""
-        found = without_unread(self._flights.request, saved.scenario, saved.flight)
+    def _without_idle(self, saved: FailingScenario) -> FailingScenario:
+        """Return the failure without the conditions that cannot have acted: the same flight."""
+        found = without_idle(self._flights.request, saved.scenario, saved.flight)
         return dataclasses.replace(saved, scenario=found) if found != saved.scenario else saved
 
     def _is_outdated(self) -> bool:

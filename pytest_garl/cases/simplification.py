@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from pytest_garl.scenarios.conditions import ACT_ALONE, active_conditions, cause_of_key
+from pytest_garl.scenarios.conditions import active_conditions, cause_of_key
 from pytest_garl.scenarios.genes import Genome, NuclearGene
 from pytest_garl.scenarios.genome_like import genome_like
 from pytest_garl.scenarios.groups import QUANTITIES
@@ -93,7 +93,7 @@ def value_simplifications(scenario: Scenario, genome: Genome) -> dict[str, list[
         values = sorted(
             (_distance(scenario, item), item.key, item.nominal)
             for item in gene.properties
-            if QUANTITIES[item.key].has_harsher_end or item.key in ACT_ALONE
+            if QUANTITIES[item.key].has_harsher_end or QUANTITIES[item.key].acts_alone
             if scenario[item.key] != item.nominal
         )
         if len(values) > 1:

@@ -37,12 +37,12 @@ class Severity:
     Of conditions: ``conditions`` are active, objects that are there included; ``values`` say for
     each which of its values are not nominal, or how many; ``largest_share`` (0..1) is how far the
     strongest lies from nominal, as a share of all that can be flown; ``largest`` says it in words.
-    ``unread`` are those of the conditions that cannot have acted: they change only data which the
+    ``idle`` are those of the conditions that cannot have acted: they change only data which the
     landing system never read, or are events that did not strike.  No text names them.  ``placed``
     says that the marker lies elsewhere than at the map's coordinate.
 
-    ``untried`` names conditions and objects of a saved case of which shrinking did not try whether
-    the violation needs them.
+    ``untried`` names conditions and objects of a saved case, the marker's place, and conditions
+    value by value, of which shrinking did not try whether the violation needs them.
     """
 
     about: Literal["", "body", "conditions"] = ""
@@ -57,7 +57,7 @@ class Severity:
     values: tuple[str, ...] = ()
     largest: str = ""
     largest_share: float = 0.0
-    unread: tuple[str, ...] = ()
+    idle: tuple[str, ...] = ()
     placed: bool = False
     untried: tuple[str, ...] = ()
 
@@ -111,7 +111,7 @@ class Severity:
     def acting(self) -> list[tuple[str, str]]:
         """Return (name, value) of the conditions that may have acted."""
         pairs = zip(self.conditions, self.values, strict=True)
-        return [(name, value) for name, value in pairs if name not in self.unread]
+        return [(name, value) for name, value in pairs if name not in self.idle]
 
     @property
     def tried(self) -> list[tuple[str, str]]:
@@ -130,7 +130,7 @@ class Severity:
         return value or self.largest
 
     def _untried_text(self) -> str:
-        names = [each for each in self.untried if each not in self.unread]
+        names = [each for each in self.untried if each not in self.idle]
         if not names:
             return ""
         if len(names) > MOST_LISTED:
@@ -184,7 +184,7 @@ class Severity:
             "values": list(self.values),
             "largest": self.largest,
             "largest_share": self.largest_share,
-            "unread": list(self.unread),
+            "idle": list(self.idle),
             "placed": self.placed,
         }
         facts = {"": {}, "body": body, "conditions": conditions}[self.about]

@@ -60,7 +60,7 @@ def severity_of(
         largest=strongest.words if strongest else "",
         # Of all conditions, so that what a system reads does not change which scenarios are bred.
         largest_share=max((each.share for each in conditions), default=0.0),
-        unread=idle,
+        idle=idle,
         placed=scenario.has_moved_marker,
     )
 

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from pytest_garl.scenarios.genes import SUN
 from pytest_garl.scenarios.groups import (
@@ -28,8 +29,6 @@ NOON = 0.5
 """The nominal position of the sun."""
 MOST_NAMED = 3
 """More values of one cause than these are counted and not named."""
-ACT_ALONE = ("pad.yaw_deg",)
-"""Directions that may act without any other value of their cause."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +61,9 @@ def active_conditions(scenario: Scenario) -> tuple[ActiveCondition, ...]:
     found = []
     for cause, names in WEATHER_CAUSES.items():
         genes = {name: scenario.get(f"environment.{name}", 0.0) for name in names}
-        values = [(gene, _weather(cause, name, gene)) for name, gene in genes.items() if gene > 0]
+        values = [
+            _Value(gene, _weather(cause, name, gene)) for name, gene in genes.items() if gene > 0
+        ]
         found += _condition(cause, values)
     found += _condition(LIGHT_GROUP, _light(scenario))
     for name, group in GROUPS.items():
@@ -72,9 +73,7 @@ def active_conditions(scenario: Scenario) -> tuple[ActiveCondition, ...]:
             when = _when(scenario, name)
             found += [
                 dataclasses.replace(each, when=when)
-                for each in _condition(
-                    name, list(_values(scenario, group)), _alone(scenario, group)
-                )
+                for each in _condition(name, list(_values(scenario, group)))
             ]
     return tuple(found)
 
@@ -122,15 +121,27 @@ def without_groups(scenario: Scenario, names: Collection[str]) -> Scenario:
     return scenario.replace(nominal) if nominal else scenario
 
 
-def _condition(
-    cause: str, values: list[tuple[float, str]], alone: Collection[str] = ()
-) -> list[ActiveCondition]:
+class _Value(NamedTuple):
+    """A value that is not nominal: how far, in words, and whether it may matter alone."""
+
+    share: float
+    words: str
+    acts_alone: bool = False
+
+
+def _condition(cause: str, values: list[_Value]) -> list[ActiveCondition]:
     if not values:
         return []
-    share, words = max(values, key=lambda each: each[0])
-    strong = tuple(text for part, text in values if part > 0 or text in alone)
-    share = round(min(1.0, share), 4)
-    return [ActiveCondition(cause=cause, share=share, words=words, values=strong or (words,))]
+    strongest = max(values, key=lambda each: each.share)
+    named = tuple(each.words for each in values if each.share > 0 or each.acts_alone)
+    return [
+        ActiveCondition(
+            cause=cause,
+            share=round(min(1.0, strongest.share), 4),
+            words=strongest.words,
+            values=named or (strongest.words,),
+        )
+    ]
 
 
 def _weather(cause: str, name: str, gene: float) -> str:
@@ -138,26 +149,20 @@ def _weather(cause: str, name: str, gene: float) -> str:
     return _in_words(cause, weather.name, weather.at(gene))
 
 
-def _light(scenario: Scenario) -> list[tuple[float, str]]:
+def _light(scenario: Scenario) -> list[_Value]:
     position = scenario.get(SUN, NOON)
     if position == NOON and scenario[TURN] == 0:
         return []
     up_deg = round(sun_elevation_deg(position))
     words = f"sun {abs(up_deg)} degrees {'below the horizon' if up_deg < 0 else 'high'}"
-    return [(abs(position - NOON) / NOON, words)]
+    return [_Value(abs(position - NOON) / NOON, words)]
 
 
-def _values(scenario: Scenario, group: Group) -> Iterator[tuple[float, str]]:
+def _values(scenario: Scenario, group: Group) -> Iterator[_Value]:
     for each in group.quantities:
         value = scenario[each.key]
         if value != each.nominal and each.name != "after":
-            yield _share(each, value), _value_in_words(each, value)
-
-
-def _alone(scenario: Scenario, group: Group) -> tuple[str, ...]:
-    """Return the words of directions that may act without any other value."""
-    directions = [each for each in group.quantities if each.key in ACT_ALONE]
-    return tuple(_value_in_words(each, scenario[each.key]) for each in directions)
+            yield _Value(_share(each, value), _value_in_words(each, value), each.acts_alone)
 
 
 def _share(quantity: Quantity, value: float) -> float:

@@ -426,6 +426,7 @@ PAD = Group(
         Quantity(
             key="pad.yaw_deg",
             even=True,
+            acts_alone=True,
             low=-180.0,
             high=180.0,
             meaning="turn of the marker, counter-clockwise; at 0 its top is north",

@@ -39,12 +39,13 @@ class Quantity:
     A scenario that does not name it has its ``nominal`` value, which has no effect.  ``low`` and
     ``high`` are the limits of what the simulator can fly, or within them those of a genome.
     ``source`` says where the range of the domain `field` comes from.  A value of a ``whole`` one
-    is rounded.  ``choices`` name the whole values from 0 on; such a value is rounded up: only 0 is
-    the first, unless it is ``whole`` as well.  Files and reports state the name.  An ``even`` one
-    has no harsher end, as a direction or a time, and is drawn evenly; of any other one half of the
-    draws of a sparse genome lie in the third that is farthest from nominal.  ``scale`` is "inverse"
-    for a visibility, whose effect grows with 1 / value: it is strongest at ``low``, and infinite
-    without effect.
+    is rounded.  ``choices`` name the whole values from 0 on; such a value is rounded up: only 0
+    is the first, unless it is ``whole`` as well.  Files and reports state the name.  An
+    ``even`` one has no harsher end, as a direction or a time, and is drawn evenly; of any other
+    one half of the draws of a sparse genome lie in the third that is farthest from nominal.
+    One that ``acts_alone`` may matter without the other values of its group, as how a pad lies
+    turned.  ``scale`` is "inverse" for a visibility, whose effect grows with 1 / value: it is
+    strongest at ``low``, and infinite without effect.
     """
 
     key: str
@@ -56,6 +57,7 @@ class Quantity:
     whole: bool = False
     choices: tuple[str, ...] = ()
     even: bool = False
+    acts_alone: bool = False
     scale: Literal["linear", "inverse"] = "linear"
 
     def __post_init__(self) -> None:

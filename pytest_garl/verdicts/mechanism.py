@@ -255,12 +255,13 @@ def _report_text(evidence: Evidence) -> str:
 
 def _share_text(evidence: Evidence, at_s: float) -> str:
     """Return in how many of the last pictures a marker in view could be read, if not in all."""
-    latest = [s.time_s for s in evidence.flight.steps if at_s - LAST_S <= s.time_s <= at_s]
-    readable = [s for s in evidence.readable_until(at_s) if s.time_s >= at_s - LAST_S]
+    last_s = min(LAST_S, at_s)
+    latest = [s.time_s for s in evidence.flight.steps if at_s - last_s <= s.time_s <= at_s]
+    readable = [s for s in evidence.readable_until(at_s) if s.time_s >= at_s - last_s]
     share = len(readable) / len(latest) if latest else 1.0
     if share > ALL_SHARE:
         return " to the end"
-    return f": readable in {100 * share:.0f} % of the pictures of the last {LAST_S:.0f} s"
+    return f": readable in {100 * share:.0f} % of the pictures of the last {last_s:.0f} s"
 
 
 def _unranged_text(evidence: Evidence) -> str:

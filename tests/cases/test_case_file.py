@@ -186,7 +186,7 @@ def test_a_file_says_whether_its_severity_is_what_it_takes() -> None:
         dataclasses.replace(BODY, grade="", window_s=None, untried=("dog-1", "fog")),
         CONDITIONS,
         Severity(about="conditions"),
-        dataclasses.replace(CONDITIONS, untried=("wind",), unread=("fog",)),
+        dataclasses.replace(CONDITIONS, untried=("wind",), idle=("fog",)),
         NO_SEVERITY,
     ],
 )

@@ -203,7 +203,7 @@ def test_what_was_never_read_is_dropped_without_a_flight(
     assert "condition" in result.case.evidence.removed
     read = dataclasses.replace(recorded(steps=seen(())), data_read=("image", "depth_m"))
     save(read, record)
-    assert CaseFlights(request, FakeFlights(fails)).without_unread(found) == found
+    assert CaseFlights(request, FakeFlights(fails)).without_idle(found) == found
 
 
 def test_conditions_that_no_flight_tried_to_remove_are_named() -> None:
@@ -224,6 +224,24 @@ def test_conditions_that_no_flight_tried_to_remove_are_named() -> None:
     )
     assert not flights.fails_live(repair(VIOLATING_SCENARIO.without(OBJECT_NAMES[1]), LAWN))
     assert {*flights.untried(failing)} == everything - {"fog", OBJECT_NAMES[1]}
+
+
+def test_a_condition_of_which_no_flight_tried_a_value_is_named() -> None:
+    turned = VIOLATING_SCENARIO.replace({"pad.yaw_deg": -152.0, "pad.worn_percent": 18.0})
+    request = make_case_request(40, turned, signature=LATE)
+    flights = CaseFlights(request, FakeFlights(lambda *_: False, signature=LATE))
+    failing = FailingScenario(
+        origin=turned,
+        scenario=turned,
+        behaviour=RecordedBehaviour(moves=()),
+        flight=flights.live_flight(turned),
+    )
+    assert "each value of pad" not in flights.untried(failing), "the whole pad was not tried"
+    level = turned.replace({"pad.yaw_deg": 0.0, "pad.worn_percent": 0.0})
+    assert not flights.fails_live(repair(level, LAWN))
+    assert "each value of pad" in flights.untried(failing)
+    assert not flights.fails_live(repair(turned.replace({"pad.yaw_deg": 0.0}), LAWN))
+    assert "each value of pad" not in flights.untried(failing)
 
 
 def test_a_case_that_was_shrunk_to_its_end_names_nothing() -> None:

@@ -11,6 +11,7 @@ from pytest_garl.cases.simplification import (
     genome_of_scenario,
     simplifications,
     simplified,
+    value_simplifications,
     without_other_objects,
 )
 from pytest_garl.scenarios.scenario import Scenario
@@ -64,6 +65,15 @@ def test_empty_scenario_is_nominal_without_objects() -> None:
     empty = empty_scenario(VIOLATING_SCENARIO, LAWN)
     assert {*empty.removed_objects} == {*OBJECT_NAMES}
     assert empty["environment.fog"] == 0.0
+
+
+def test_how_a_pad_lies_turned_is_a_value_of_its_own() -> None:
+    turned = VIOLATING_SCENARIO.replace({"pad.yaw_deg": -152.0, "pad.worn_percent": 18.0})
+    steps = value_simplifications(turned, genome_of_scenario(turned, LAWN))["pad"]
+    left = [(step(turned)["pad.yaw_deg"], step(turned)["pad.worn_percent"]) for step in steps]
+    assert sorted(left) == [(-152.0, 0.0), (0.0, 18.0)]
+    blown = VIOLATING_SCENARIO.replace({"wind.mean_mps": 3.0, "wind.towards_deg": 90.0})
+    assert value_simplifications(blown, genome_of_scenario(blown, LAWN)) == {}
 
 
 GENOME = genome_of_scenario(VIOLATING_SCENARIO, LAWN)

@@ -140,7 +140,7 @@ LIGHT_AND_DEPTH = Severity(
 
 
 def test_data_that_was_never_read_is_no_condition() -> None:
-    blind = dataclasses.replace(LIGHT_AND_DEPTH, unread=("depth",))
+    blind = dataclasses.replace(LIGHT_AND_DEPTH, idle=("depth",))
     assert blind.text == "light alone, sun 23 degrees high"
     assert blind.unusual == "light (sun 23 degrees high)"
     # What a system reads does not change which flights a search prefers.

@@ -167,7 +167,7 @@ def test_event_that_strikes_while_the_marker_is_covered_says_so(
     named = dict(zip(found.conditions, found.values, strict=True))
     assert named == {"outage": words, "cover": "lasts 3 s, share 100 %"}
     # What did not strike cannot have acted, and no text names it.
-    assert found.unread == (("outage",) if "did not strike" in words else ())
+    assert found.idle == (("outage",) if "did not strike" in words else ())
     assert ("outage" in found.unusual) == ("did not strike" not in words)
 
 

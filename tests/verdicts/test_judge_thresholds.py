@@ -93,7 +93,7 @@ def test_a_marker_readable_in_the_last_three_seconds_was_seen(seen_s: float, sig
         (
             27.0,
             "late:not-landed:approach",
-            "was in view: readable in 67 % of the pictures of the last 60 s",
+            "was in view: readable in 67 % of the pictures of the last 30 s",
         ),
         (26.9, "II:lost:approach", "the marker was last readable at 26.9 s"),
     ],

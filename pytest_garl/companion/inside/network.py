@@ -39,11 +39,11 @@ _virtual = (socket.AF_INET, socket.AF_INET6, socket.AF_UNIX)
 class Network:
     """All sockets of the program; ``outbox`` is what it has sent to the vehicle.
 
-    ``place`` returns the program's line that is running.
+    ``line`` returns the program's line that is running.
     """
 
-    def __init__(self, turns: Turns, place: Callable[[], str] = str) -> None:
-        self.turns, self._line = turns, place
+    def __init__(self, turns: Turns, line: Callable[[], str]) -> None:
+        self.turns, self._line = turns, line
         self.outbox = bytearray()
         self.senders: list[tuple[int, str]] = []
         """Where in the outbox what a line has sent begins, and the line."""
