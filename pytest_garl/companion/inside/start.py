@@ -14,6 +14,7 @@ import socket
 import struct
 import sys
 import traceback
+import types
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -298,15 +299,21 @@ def failure_of(error: BaseException) -> dict[str, Any]:
 
 def line_of_program() -> str:
     """Return the program's own line that is running; a library's only if all is a library's."""
+    frame: types.FrameType | None = sys._getframe(1)
     found = ""
-    for frame, number in traceback.walk_stack(sys._getframe(1)):
+    while frame is not None:
         name = frame.f_code.co_filename
         if not _is_carrier(name):
-            line = f"{Path(name).name}, line {number}"
             if not _is_library(name):
-                return line
-            found = found or line
+                return f"{_file_name(name)}, line {frame.f_lineno}"
+            found = found or f"{_file_name(name)}, line {frame.f_lineno}"
+        frame = frame.f_back
     return found
+
+
+@functools.cache
+def _file_name(path: str) -> str:
+    return Path(path).name
 
 
 @functools.cache
