@@ -195,10 +195,10 @@ def test_options_page_lists_every_option_with_its_default(
     lines = (DOCS / "options.md").read_text().splitlines()
     rows = [re.split(r"(?<!\\)\|", line) for line in lines if line.startswith("| ")]
     options = {found[0]: row for row in rows if (found := re.findall(r"--garl-(\w+)", row[1]))}
-    keys = {found[0]: row for row in rows if (found := re.findall(r"ini `(\w+)`", row[1]))}
+    keys = {found[0]: row for row in rows if (found := re.findall(r"ini `([\w-]+)`", row[1]))}
     shown = pytester.runpytest_subprocess("--help").stdout.str()
     assert set(options) == set(re.findall(r"^  --garl-(\w+)", shown, re.MULTILINE))
-    known = set(re.findall(r"^  (garl_\w+) \(", shown, re.MULTILINE))
+    known = set(re.findall(r"^  (garl_[\w-]+) \(", shown, re.MULTILINE))
     assert set(keys) == known - {f"garl_{name}" for name in options}
     config = pytester.parseconfig()
     defaults = {name: config.getini(f"garl_{name}") for name in set(options) - {"resume"}}

@@ -164,7 +164,7 @@ def test_ray_flies_programs_to_the_bytes_of_this_machine(
 ) -> None:
     hashes = []
     for pool in ("ray", "local"):
-        run(pytester, "--garl-budget=2", *SEARCH, f"--garl-pool={pool}", "--garl-workers=2")
+        run(pytester, "--garl-budget=2", *SEARCH, "-o", f"garl_pool={pool}", "--garl-workers=2")
         hashes.append(result_hash(pytester))
         shutil.rmtree(project / ".garl")
     assert hashes[0] == hashes[1]

@@ -19,6 +19,19 @@ from pytest_garl.search.method_catalogue import DEFAULT_METHOD, method_names
 Option = namedtuple("Option", ["name", "metavar", "help", "default"], defaults=[""])
 """One option: its name without ``garl-``, default, and what ``--help`` says."""
 
+Key = namedtuple("Key", ["name", "help", "default", "type"], defaults=["", None])
+"""A setting that only an ini key has: its name, what ``--help`` says, default, and type."""
+
+GROUPS = {
+    "garl: what is flown (pytest-garl searches for violations of landing systems)": (
+        *("budget", "map", "domain", "npcs", "repeat"),
+    ),
+    "garl: how it searches": ("seed", "method", "population", "shrink"),
+    "garl: how it flies": ("workers", "timeout", "resume"),
+    "garl: gate and reports": ("baseline", "report", "film"),
+}
+"""The names of the options by their heading in ``pytest --help``."""
+
 OPTIONS = (
     Option(
         name="budget",
@@ -59,14 +72,6 @@ OPTIONS = (
         "cluster).",
     ),
     Option(
-        name="pool",
-        metavar="WHERE",
-        default="local",
-        help="Where to fly: 'local' flies in worker processes, 'ray' on the Ray cluster of "
-        "RAY_ADDRESS. If RAY_ADDRESS is not set, 'ray' starts a cluster here, which ends with the "
-        "run. 'ray' needs pytest-garl[ray]. The results are the same (default: local).",
-    ),
-    Option(
         name="domain",
         metavar="NAME|FILE",
         help="Operational domain: the conditions in which the landing system is to land. Built in "
@@ -88,13 +93,6 @@ OPTIONS = (
         "court-g03-s17, or a scenario file.",
     ),
     Option(
-        name="duplicates",
-        metavar="HOW",
-        default="xfail",
-        help="How to report a test that fails in the same assertion and with the same signature "
-        "as in an earlier slot of the search: 'xfail' or 'fail' (default: xfail).",
-    ),
-    Option(
         name="shrink",
         metavar="N",
         help="Flights to confirm, shrink and save each new kind of violation: 8 or more; a Python "
@@ -109,24 +107,11 @@ OPTIONS = (
         "or if a flight is inconclusive.",
     ),
     Option(
-        name="level",
-        metavar="P",
-        default="0.05",
-        help="False-alarm rate of the gate per map: how often it may fail a landing system that "
-        "is no worse than the baseline, between 0 and 1 (default: 0.05).",
-    ),
-    Option(
         name="report",
         metavar="DIR",
         help="Write the run as pages into this folder when it ends: what was found, and a page for "
         "each kind of violation, with films if pytest-garl[video] is installed. `garl report "
         "--out=DIR` does the same later.",
-    ),
-    Option(
-        name="report-url",
-        metavar="URL",
-        help="Where the folder of --garl-report will be published, such as a site of GitHub Pages: "
-        "GitHub's step summary shows its pictures and links to its pages, and so does JUnit XML.",
     ),
     Option(
         name="film",
@@ -146,61 +131,92 @@ OPTIONS = (
     ),
 )
 
-"""The folder of the saved cases if the ini key names none."""
+RESUME = (
+    "Continue the interrupted run of the ledger. Options, landing system and versions must not "
+    "have changed."
+)
+
+KEYS = (
+    Key(
+        name="garl_dir",
+        help="Folder of the ledger and the records of flights.",
+        default=RUN_FOLDER,
+    ),
+    Key(name="garl_cases", help=f"Folder of the saved cases (default: {CASES_FOLDER})."),
+    Key(
+        name="garl_archive",
+        help="File in which searches keep their flights for later searches: read when a search "
+        "begins, written when it ends (default: none).",
+    ),
+    Key(
+        name="garl_duplicates",
+        default="xfail",
+        help="How to report a test that fails in the same assertion and with the same signature "
+        "as in an earlier slot of the search: 'xfail' or 'fail' (default: xfail).",
+    ),
+    Key(
+        name="garl_xfail_strict",
+        help="Whether an open saved case that passes fails the run.",
+        type="bool",
+        default=False,
+    ),
+    Key(
+        name="garl_unasserted",
+        help="What a violation is that no selected test asserts: 'fail' fails the run, 'note' is a "
+        "line of the summary (default: fail where the environment variable CI is set, else note).",
+    ),
+    Key(
+        name="garl_level",
+        default="0.05",
+        help="False-alarm rate of the gate per map: how often it may fail a landing system that "
+        "is no worse than the baseline, between 0 and 1 (default: 0.05).",
+    ),
+    Key(
+        name="garl_report-url",
+        help="Where the folder of --garl-report will be published, such as a site of GitHub Pages: "
+        "GitHub's step summary shows its pictures and links to its pages, and so does JUnit XML.",
+    ),
+    Key(
+        name="garl_pool",
+        default="local",
+        help="Where to fly: 'local' flies in worker processes, 'ray' on the Ray cluster of "
+        "RAY_ADDRESS. If RAY_ADDRESS is not set, 'ray' starts a cluster here, which ends with the "
+        "run. 'ray' needs pytest-garl[ray]. The results are the same (default: local).",
+    ),
+    Key(
+        name="garl_engine",
+        help="The physics engine: 'bullet', 'mujoco', or 'auto': bullet if it is installed, else "
+        "mujoco (default: what the environment variable GARL_ENGINE says, else auto).",
+    ),
+    Key(
+        name="garl_probes",
+        help="When a search flies the probes of a landing system before: 'first', until they have "
+        "passed and again when the system has changed; 'always'; or 'never'.",
+        default="first",
+    ),
+)
 
 
 def add_options(parser: pytest.Parser) -> None:
     """Register all options and ini keys."""
-    group = parser.getgroup("garl", "search for violations of landing systems (pytest-garl)")
-    for option in OPTIONS:
-        group.addoption(
-            f"--garl-{option.name}", default=None, metavar=option.metavar, help=option.help
-        )
-        parser.addini(
-            f"garl_{option.name}",
-            help=f"Value of --garl-{option.name} if the command line has none.",
-            default=option.default,
-        )
-    group.addoption(
-        "--garl-resume",
-        action="store_true",
-        help="Continue the interrupted run of the ledger. Options, landing system and versions "
-        "must not have changed.",
-    )
-    parser.addini(
-        "garl_dir", help="Folder of the ledger and the records of flights.", default=RUN_FOLDER
-    )
-    parser.addini("garl_cases", help=f"Folder of the saved cases (default: {CASES_FOLDER}).")
-    parser.addini(
-        "garl_archive",
-        help="File in which searches keep their flights for later searches: read when a search "
-        "begins, written when it ends (default: none).",
-        default="",
-    )
-    parser.addini(
-        "garl_xfail_strict",
-        help="Whether an open saved case that passes fails the run.",
-        type="bool",
-        default=False,
-    )
-    parser.addini(
-        "garl_unasserted",
-        help="What a violation is that no selected test asserts: 'fail' fails the run, 'note' is a "
-        "line of the summary (default: fail where the environment variable CI is set, else note).",
-        default="",
-    )
-    parser.addini(
-        "garl_engine",
-        help="The physics engine: 'bullet', 'mujoco', or 'auto': bullet if it is installed, else "
-        "mujoco (default: what the environment variable GARL_ENGINE says, else auto).",
-        default="",
-    )
-    parser.addini(
-        "garl_probes",
-        help="When a search flies the probes of a landing system before: 'first', until they have "
-        "passed and again when the system has changed; 'always'; or 'never'.",
-        default="first",
-    )
+    options = {option.name: option for option in OPTIONS}
+    for heading, names in GROUPS.items():
+        group = parser.getgroup(heading)
+        for name in names:
+            if name == "resume":
+                group.addoption("--garl-resume", action="store_true", help=RESUME)
+                continue
+            option = options[name]
+            group.addoption(
+                f"--garl-{name}", default=None, metavar=option.metavar, help=option.help
+            )
+            parser.addini(
+                f"garl_{name}",
+                help=f"Value of --garl-{name} if the command line has none.",
+                default=option.default,
+            )
+    for key in KEYS:
+        parser.addini(key.name, help=key.help, default=key.default, type=key.type)
 
 
 def check_keys(config: pytest.Config) -> None:

@@ -15,8 +15,6 @@ SEARCH_OPTIONS = (
     "method",
     "population",
     "domain",
-    "weather",
-    "duplicates",
     "shrink",
     "resume",
 )
@@ -70,10 +68,6 @@ def _without_effect(options: Options) -> Iterator[str]:
             "--garl-report has no effect without --garl-budget or --garl-repeat: only a search has "
             "something to report"
         )
-    if "report-url" in given and options.report is None:
-        yield "--garl-report-url has no effect without --garl-report, whose address it is"
-    if "level" in given and options.baseline is None:
-        yield "--garl-level has no effect without --garl-baseline: only that gate uses it"
 
 
 def _no_report(options: Options) -> Iterator[str]:

@@ -16,7 +16,12 @@ _URL = re.compile(r"[\w.~:/?#@!$&*+,;=%-]+", re.ASCII)
 
 def wrong(name: str, found: str, expected: str) -> pytest.UsageError:
     """Return the error of an option with a value that it cannot have."""
-    return pytest.UsageError(f"--garl-{name}: found {found!r}, expected {expected}")
+    return refused(f"--garl-{name}", found, expected)
+
+
+def refused(where: str, found: str, expected: str) -> pytest.UsageError:
+    """Return the error of an option or an ini key with a value that it cannot have."""
+    return pytest.UsageError(f"{where}: found {found!r}, expected {expected}")
 
 
 def integer(name: str, text: str, low: int) -> int:
@@ -26,14 +31,14 @@ def integer(name: str, text: str, low: int) -> int:
     return int(text)
 
 
-def number(name: str, text: str, below: float, expected: str) -> float:
-    """Return a number between 0 and ``below``, both excluded."""
+def number(where: str, text: str, below: float, expected: str) -> float:
+    """Return a number between 0 and ``below``, both excluded, for an option or key ``where``."""
     try:
         value = float(text)
     except ValueError:
         value = -1.0
     if not 0 < value < below:
-        raise wrong(name, text, expected)
+        raise refused(where, text, expected)
     return value
 
 
@@ -66,5 +71,5 @@ def report_url(text: str) -> str:
     """Return the address without a slash at its end."""
     parts = urllib.parse.urlsplit(text)
     if text and not (parts.scheme in ("http", "https") and parts.netloc and _URL.fullmatch(text)):
-        raise wrong("report-url", text, "an address such as https://example.org/report")
+        raise refused("garl_report-url", text, "an address such as https://example.org/report")
     return text.rstrip("/")

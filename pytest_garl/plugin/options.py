@@ -6,7 +6,7 @@ import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 import pytest
 
@@ -153,6 +153,7 @@ def read_options(config: pytest.Config) -> Options:
     address = os.environ.get("RAY_ADDRESS", "")
     address = "" if address == "local" else address
     folder = config.rootpath / str(config.getini("garl_dir"))
+    pool = _word(config, "garl_pool", ("local", "ray"))
     return Options(
         given=_given(config),
         budget=budget,
@@ -161,19 +162,17 @@ def read_options(config: pytest.Config) -> Options:
         seed=int(of_controller[SEED]) if SEED in of_controller else _seed(text["seed"]),
         method=_method(text["method"]),
         maps=tuple(part.strip() for part in text["map"].split(",") if part.strip()),
-        pool=cast(Literal["local", "ray"], among("pool", text["pool"], ("local", "ray"))),
-        workers=_workers(text["workers"], text["pool"], address),
+        pool=pool,
+        workers=_workers(text["workers"], pool, address),
         ray_address=address,
-        timeout_s=number("timeout", text["timeout"], 1e6, "a positive number of seconds"),
+        timeout_s=number("--garl-timeout", text["timeout"], 1e6, "a positive number of seconds"),
         repeat=_repeat(text["repeat"]),
-        duplicates=cast(
-            Literal["xfail", "fail"], among("duplicates", text["duplicates"], ("xfail", "fail"))
-        ),
+        duplicates=_word(config, "garl_duplicates", ("xfail", "fail")),
         npcs=_npcs(text["npcs"]),
         baseline=_baseline(config),
-        level=number("level", text["level"], 1, "a number between 0 and 1"),
+        level=number("garl_level", str(config.getini("garl_level")), 1, "a number between 0 and 1"),
         report=_report(config),
-        report_url=report_url(text["report-url"]),
+        report_url=report_url(str(config.getini("garl_report-url"))),
         film=filmed(text["film"], draws=not is_xdist_worker(config)),
         shrink=_shrink(text["shrink"]),
         shrink_capped=not text["shrink"],

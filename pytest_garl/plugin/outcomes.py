@@ -112,7 +112,7 @@ class FailedItem:
     repeating: bool = False
     """Whether the session repeats one scenario."""
     duplicates: str = "xfail"
-    """Value of ``--garl-duplicates``."""
+    """Value of the ini key ``garl_duplicates``."""
     earlier: str | None = None
     """The slot of another item that reports the same failure; empty if there is none."""
     reflights: Reflights | None = None

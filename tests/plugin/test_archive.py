@@ -183,6 +183,6 @@ def test_saved_cases_and_an_interrupted_search_write_no_archive(
 ) -> None:
     archive = carrying(pytester, "paper")
     assert run(pytester).ret in (0, 5)
-    result = run(pytester, *SEARCH, "-x", "--garl-duplicates=fail")
+    result = run(pytester, *SEARCH, "-x", "-o", "garl_duplicates=fail")
     assert result.ret == 1
     assert not archive.exists()

@@ -143,7 +143,7 @@ def test_a_class_may_carry_the_marker_of_a_gate(saved: pytest.Pytester) -> None:
 
 def test_level_decides_and_better_system_passes(saved: pytest.Pytester) -> None:
     change(saved.path / "tiny_simulator.py", *WORSE)
-    lenient = run(saved, *GATE, "--garl-level=1e-9")
+    lenient = run(saved, *GATE, "-o", "garl_level=1e-9")
     lenient.assert_outcomes(passed=1, skipped=3)
     change(saved.path / "tiny_simulator.py", "> 0.3 and", "> 7 and")
     better = run(saved)
@@ -240,7 +240,7 @@ def test_broken_baseline_is_one_clear_error(saved: pytest.Pytester) -> None:
 
 
 def test_gate_beside_a_search_changes_none_of_its_figures(saved: pytest.Pytester) -> None:
-    search = ("--garl-budget=8", "--garl-shrink=0", "--garl-duplicates=fail")
+    search = ("--garl-budget=8", "--garl-shrink=0", "-o", "garl_duplicates=fail")
     result = run(saved, *GATE, *search)
     result.stdout.fnmatch_lines(["*Good on lawn: 8 flown, *"])
     result.stdout.fnmatch_lines(["Good-lawn: gate passed"])

@@ -72,7 +72,7 @@ def test_a_network_that_learns_in_pytest_finds_the_same_for_any_workers(
 
 def test_duplicates_can_be_shown_as_failures(pytester: pytest.Pytester) -> None:
     project(pytester)
-    result = run(pytester, "--garl-budget=24", "--garl-workers=0", "--garl-duplicates=fail")
+    result = run(pytester, "--garl-budget=24", "--garl-workers=0", "-o", "garl_duplicates=fail")
     outcomes = result.parseoutcomes()
     assert outcomes["failed"] > 2
     assert "xfailed" not in outcomes

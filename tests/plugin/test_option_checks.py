@@ -18,7 +18,6 @@ from tests.support.landing_project import (
         (("--garl-shrink=20",), "*--garl-shrink has no effect without --garl-budget*"),
         (("--garl-seed=4",), "*--garl-seed has no effect without --garl-budget*"),
         (("--garl-npcs=stand",), "*--garl-npcs has no effect without*"),
-        (("--garl-level=0.1",), "*--garl-level has no effect without --garl-baseline*"),
         (("--garl-repeat=lawn-g00-s00",), "*there is no ledger at*run a search first*"),
     ],
 )

@@ -34,7 +34,7 @@ needs_ray = [
     pytest.mark.ray,
     pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="needs pytest-garl[ray]"),
 ]
-WITH_RAY = ("--garl-pool=ray", "-o", "garl_workers=")
+WITH_RAY = ("-o", "garl_pool=ray", "-o", "garl_workers=")
 PATIENCE_S = 120.0
 """Ray starts slowly on a busy machine."""
 BROKEN = """

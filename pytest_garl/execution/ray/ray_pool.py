@@ -33,7 +33,7 @@ def ray_pool(queue: WorkQueue, workers: int | None, root: Path) -> Pool:
 def check_ray(address: str) -> None:
     """Raise PoolError if Ray is not installed, or if nothing answers at ``address``."""
     if importlib.util.find_spec("ray") is None:
-        raise PoolError(f"Ray is not installed; {INSTALL_COMMAND}, or fly with --garl-pool=local")
+        raise PoolError(f"Ray is not installed; {INSTALL_COMMAND}, or fly without garl_pool=ray")
     endpoint = re.fullmatch(r"(?P<host>[^/]+):(?P<port>\d+)", address)
     if endpoint is None:
         # Only Ray can resolve "auto" and ray://…

@@ -42,8 +42,8 @@ def index_parts(page: RunPage, folder: Path, url: str) -> list[str]:
         where = f"[The whole report]({url}/{INDEX})"
     else:
         where = (
-            f"The whole report is {code(f'{folder.name}/{INDEX}')}. With `--garl-report-url` this "
-            "summary links to it and shows a picture of each kind."
+            f"The whole report is {code(f'{folder.name}/{INDEX}')}. With the ini key "
+            "`garl_report-url` this summary links to it and shows a picture of each kind."
         )
     parts = [where, *(escaped(note) for note in page.notes)]
     parts += _pictures(page, url) if url else []
