@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 import click
 
 from pytest_garl import cpu_dispatch, engine
+from pytest_garl.cli.examples import add_examples
 from pytest_garl.errors import GarlError, check_platform
 
 COMMANDS = {
@@ -31,6 +32,8 @@ COMMANDS = {
     "train": "train",
 }
 """The subcommands, and the module of each, without ``_command``."""
+_FIRST = ("init", "check", "report", "cases", "film", "diff")
+"""The subcommands that most people need, in the order in which they need them."""
 _FLIES = "check"
 """The subcommand that flies in its own process."""
 _ENGINE = {"baseline", "cases", "check", "diff", "export", "film", "train"}
@@ -77,7 +80,18 @@ class _Group(Pinned, click.Group):
         cpu_dispatch.pin()
         module = importlib.import_module(f"pytest_garl.cli.{COMMANDS[cmd_name]}_command")
         found: click.Command = getattr(module, cmd_name)
+        add_examples(found, cmd_name)
         return found
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the subcommands that most people need before the others."""
+        others = [name for name in self.list_commands(ctx) if name not in _FIRST]
+        for heading, names in (("Commands", _FIRST), ("More commands", others)):
+            lines = {name: self.get_command(ctx, name) for name in names}
+            with formatter.section(heading):
+                formatter.write_dl(
+                    [(name, each.get_short_help_str(100)) for name, each in lines.items() if each]
+                )
 
 
 @contextlib.contextmanager

@@ -114,7 +114,10 @@ def _spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.group()
 def baseline() -> None:
-    """Save the present verdicts of a landing system, for pytest --garl-baseline=FILE."""
+    """Save today's verdicts for the gate.
+
+    pytest --garl-baseline=FILE flies the same scenarios later, and fails if the system is worse.
+    """
 
 
 @baseline.command()
@@ -129,7 +132,7 @@ def baseline() -> None:
 def save(
     ledger: Path | None, out: Path, workers: int, systems: tuple[str, ...], **chosen: Any
 ) -> None:
-    """Fly random scenarios with the landing system of this folder, and save the verdicts.
+    """Fly random scenarios and save their verdicts.
 
     Run it where you run pytest. The same options choose the same scenarios for every system.
     """
@@ -156,7 +159,10 @@ def save(
 @baseline.command()
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
 def show(file: Path) -> None:
-    """Print how the flights of a baseline ended: landed ones first, then what went wrong."""
+    """Print how the flights of a baseline ended.
+
+    Those that landed come first, then what went wrong.
+    """
     from pytest_garl.gate.baseline_file import load_baseline
 
     for each in load_baseline(file, (_maps_folder(),)).sets:
@@ -167,7 +173,10 @@ def show(file: Path) -> None:
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
 @click.argument("name")
 def scenario(file: Path, name: str) -> None:
-    """Print one scenario of a baseline, such as court-17, as a file for pytest --garl-repeat."""
+    """Print one scenario of a baseline.
+
+    The scenario, such as court-17, is a file for pytest --garl-repeat.
+    """
     from pytest_garl.gate.baseline_file import load_baseline
     from pytest_garl.scenarios.files import dumps
     from pytest_garl.scenarios.maps.loading import load_map
@@ -201,7 +210,7 @@ def diff(
     systems: tuple[str, ...],
     **chosen: Any,
 ) -> None:
-    """Fly the same scenarios with two checkouts of a landing system and compare pair by pair.
+    """Compare two checkouts in the same scenarios.
 
     BASE and HEAD are folders, such as two git worktrees. The exit status is 1 if HEAD has a new
     type of violation, significantly more violations or aborts, landings that are significantly

@@ -78,7 +78,7 @@ class _Project:
 @FOLDER
 @click.pass_context
 def cases(context: click.Context, folder: Path) -> None:
-    """Manage saved violations: list, show, replay, accept, promote, shrink, renew, prune, check.
+    """Show, replay and manage saved violations.
 
     A case is a file under scenarios/regressions/<system>/. Run these commands where you run pytest.
     """
@@ -103,7 +103,10 @@ FILES = click.argument(
 @cases.command("list")
 @click.pass_obj
 def list_(project: _Project) -> None:
-    """List all cases with status, signature, robustness and number of objects."""
+    """List all cases.
+
+    A row has status, signature, robustness and number of objects.
+    """
     found = project.corpus.all_entries()
     if not found:
         say(f"no cases in {project.corpus.folder}; a search saves what it finds")
@@ -129,7 +132,7 @@ def list_(project: _Project) -> None:
 @FILE
 @click.pass_obj
 def show(project: _Project, file: Path) -> None:
-    """Show what happens in a case, in words and physical units."""
+    """Show what happens in a case, in words and units."""
     case = project.case(file)
     say(f"{case.id}  {case.status}  {case.system}")
     say(f"{case.violation.signature}: {case.violation.description}")
@@ -168,10 +171,11 @@ def show(project: _Project, file: Path) -> None:
 )
 @click.pass_context
 def replay_(context: click.Context, file: Path, live: bool, video: Path | None) -> None:
-    """Fly a case again and answer FIXED, FAILED, STALE or UNDECIDED (exit status 0, 1, 3, 3).
+    """Fly a case again, and say if it is fixed.
 
-    The tests that found it judge: pytest flies this one case in a process of its own. If the case
-    names no test, the built-in verdict judges.
+    The answer is FIXED, FAILED, STALE or UNDECIDED (exit status 0, 1, 3, 3). The tests that found
+    it judge: pytest flies this one case in a process of its own. If the case names no test, the
+    built-in verdict judges.
     """
     project: _Project = context.obj
     case = project.case(file)
@@ -206,7 +210,7 @@ def _show_replay(replayed: Replay) -> None:
 @FILES
 @click.pass_obj
 def accept(project: _Project, files: tuple[Path, ...]) -> None:
-    """Make cases known: they are expected to fail until they are fixed.
+    """Make cases known: they may fail until they are fixed.
 
     Use it in a project without git. A committed case is known already.
     """
@@ -343,12 +347,12 @@ def shrink(project: _Project, file: Path, flights: int, workers: int, *, as_it_f
 )
 @click.pass_obj
 def renew(project: _Project, files: tuple[Path, ...], workers: int) -> None:
-    """Renew the hashes of cases that fail again to the byte with today's sources: all, or FILEs.
+    """Renew the hashes of cases that fail again to the byte.
 
-    Do that after an upgrade, before you repair your landing system: only then does a later pass
-    count as a repair. If the flight is the recorded one, but today's version calls the violation
-    something else, the file gets the new signature and name. A case whose flight differs stays as
-    it is, and the exit status is 1.
+    It flies all cases, or FILEs, with today's sources. Do that after an upgrade, before you repair
+    your landing system: only then does a later pass count as a repair. If the flight is the
+    recorded one, but today's version calls the violation something else, the file gets the new
+    signature and name. A case whose flight differs stays as it is, and the exit status is 1.
     """
     from pytest_garl.cases.renewal import RenewalResult, renew
 
@@ -403,7 +407,7 @@ def _written(renewal: Renewal, map_folders: tuple[Path, ...]) -> Renewal:
 @click.option("--yes", is_flag=True, help="Delete without asking.")
 @click.pass_obj
 def prune(project: _Project, yes: bool) -> None:
-    """Fly all cases that are not fixed, and delete stale ones.
+    """Fly all cases that are not fixed; delete stale ones.
 
     A stale case passes, but nothing shows that the landing system was repaired (see the table in
     docs/cases.md). A case that fails, or is undecided, stays.
@@ -425,10 +429,11 @@ def prune(project: _Project, yes: bool) -> None:
 @cases.command()
 @click.pass_obj
 def check(project: _Project) -> None:
-    """Check all files without flying: readable, named after their content, flown by a test.
+    """Check all files without flying.
 
-    pytest collects the test files of the project that have the marker, and those that cases name. A
-    case that none of them flies is lost.
+    Each must be readable, named after its content, and flown by a test. pytest collects the test
+    files of the project that have the marker, and those that cases name. A case that none of them
+    flies is lost.
     """
     from pytest_garl.cases.census import census
 

@@ -18,12 +18,13 @@ _HOME = Path(__file__).parents[1] / "external" / "clients"
 @click.command()
 @click.argument("languages", metavar="python|cpp|ros2", nargs=-1, required=True)
 def client(languages: tuple[str, ...]) -> None:
-    """Write the file by which a program of your language flies, into the current folder.
+    """Write the file by which a program of yours flies.
 
-    python: garl_client.py, one module for Python 3.8 or later without dependencies. cpp: garl.hpp,
-    one header for C++17. ros2: garl_ros2.py too, which stands between pytest-garl and a ROS 2 node.
-    A file of an earlier version is replaced. A test flies the program by
-    system=pytest_garl.ExternalProgram([...]); docs/protocol.md says what it reads and writes.
+    It goes into the current folder. python: garl_client.py, one module for Python 3.8 or later
+    without dependencies. cpp: garl.hpp, one header for C++17. ros2: garl_ros2.py too, which stands
+    between pytest-garl and a ROS 2 node. A file of an earlier version is replaced. A test flies the
+    program by system=pytest_garl.ExternalProgram([...]); docs/protocol.md says what it reads and
+    writes.
     """
     unknown = [each for each in languages if each not in FILES]
     if unknown:

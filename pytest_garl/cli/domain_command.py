@@ -31,7 +31,7 @@ _HEADS = {
 
 @click.group()
 def domain() -> None:
-    """Show operational domains: the conditions in which a system is to land.
+    """Show the conditions in which a system is to land.
 
     A test names one as domain="field" in its marker, a run as --garl-domain=NAME or FILE.
     """
@@ -48,7 +48,10 @@ def list_domains() -> None:
 @domain.command()
 @click.argument("name", default=DEFAULT_DOMAIN)
 def show(name: str) -> None:
-    """Show each range of the domain NAME, or of a TOML file, with its meaning and source."""
+    """Show each range of a domain, with its source.
+
+    NAME is a domain that comes with pytest-garl, or a TOML file.
+    """
     click.echo(text_of(domain_with_policy(name, Path.cwd())), nl=False)
 
 

@@ -28,11 +28,12 @@ SUFFIX = ".mcap"
     help="Write an MCAP file for Foxglove and Rerun, such as flight.mcap (extra: mcap).",
 )
 def export(mcap: Path, **named: Any) -> None:
-    """Write a flight with its pictures, poses, bodies, plans, events and margins as an MCAP file.
+    """Write a flight as an MCAP file.
 
-    SLOT is a slot of the last run, such as court-g03-s17; nothing is flown. CASE is a saved case,
-    by its name or its .toml file; it is flown again if the ledger has no record of its flight. FILE
-    is a flight's record (.npz). docs/export.md lists the topics.
+    It holds pictures, poses, bodies, plans, events and margins. SLOT is a slot of the last run,
+    such as court-g03-s17; nothing is flown. CASE is a saved case, by its name or its .toml file; it
+    is flown again if the ledger has no record of its flight. FILE is a flight's record (.npz).
+    docs/export.md lists the topics.
     """
     if mcap.suffix != SUFFIX:
         raise OptionError(

@@ -31,10 +31,10 @@ from pytest_garl.reports.film.film_file import check_film_file
     help="Show only the last seconds of the flight.",
 )
 def film(out: Path | None, last_s: float | None, **named: Any) -> None:
-    """Draw a flight as a film (needs ffmpeg, or the extra: video).
+    """Draw a flight as a film.
 
-    SLOT is a slot of the last run, such as court-g03-s17. Its film is drawn from the flight's
-    record.
+    It needs ffmpeg, or the extra: video. SLOT is a slot of the last run, such as court-g03-s17. Its
+    film is drawn from the flight's record.
 
     CASE is a saved case: its name, or its .toml file. Its film is drawn from the record if the
     ledger has its flight; if not, the case is flown again. Nobody judges it.

@@ -103,7 +103,7 @@ class _Step:
     help="MODULE:CLASS has an interface of its own: write a landing system around it.",
 )
 def init(system: str, *, example: bool, adapter: bool) -> None:
-    """Write a test file, pytest's settings and a .gitignore entry.
+    """Write tests and settings for your landing system.
 
     MODULE:CLASS is your landing system, such as my_landing:MyLandingSystem. Without it the command
     writes one to begin with, my_landing.py, which lands in clear air. SCRIPT is a Python program

@@ -54,10 +54,11 @@ def report(
     workers: int | None,
     folder: Path,
 ) -> None:
-    """Report the findings of the run in LEDGER (default .garl/ledger.sqlite).
+    """Report what a run found, as text, pages or JSON.
 
-    Without options it prints a short form; --out=DIR writes pages for people, which begin with
-    DIR/index.html. Use it while the run goes on, or after a run was killed.
+    The run is that of LEDGER (default .garl/ledger.sqlite). Without options it prints a short form;
+    --out=DIR writes pages for people, which begin with DIR/index.html. Use it while the run goes
+    on, or after a run was killed.
 
     With the ledger of a LATER run it shows the two side by side: which kinds of violation came and
     went, landed and gave up. To compare two versions of a landing system in the same scenarios, use

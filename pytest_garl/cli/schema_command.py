@@ -22,11 +22,11 @@ FOLDER = "schemas"
     help="The folder.",
 )
 def schema(out: Path) -> None:
-    """Write JSON schemas of case, domain, map and scenario files, for editors.
+    """Write JSON schemas of files, for editors.
 
-    An editor with an extension for TOML completes such a file and explains its keys if the file
-    begins with a line such as `#:schema schemas/domain.schema.json`, or if .taplo.toml names the
-    schema of a folder (docs/editors.md).
+    They describe case, domain, map and scenario files. An editor with an extension for TOML
+    completes such a file and explains its keys if the file begins with a line such as `#:schema
+    schemas/domain.schema.json`, or if .taplo.toml names the schema of a folder (docs/editors.md).
     """
     for name, make in SCHEMAS.items():
         path = out / f"{name}.schema.json"

@@ -28,7 +28,7 @@ RECENT_EPISODES = 50
 """Number of episodes over which the progress bar averages."""
 
 
-@click.command(epilog="Example: garl train --map=court --type=dog --out=scenarios/dogs.npz")
+@click.command()
 @click.option(
     "--policy",
     type=click.Choice(list(PRESETS)),
@@ -114,11 +114,10 @@ RECENT_EPISODES = 50
     "it.",
 )
 def train(**options: Any) -> None:
-    """Train an NPC policy in the surrogate and write its weights.
+    """Train an NPC policy and write its weights.
 
-    The surrogate is a landing on the project's own simulator: one NPC, a marker at a fixed
-    place, and a UAV that knows the place. A seed takes about five minutes on two cores.
-    Then use the weights: pytest --garl-budget=40 --garl-npcs=policy.npz
+    It learns in the surrogate, a landing on the project's own simulator: one NPC, a marker at a
+    fixed place, and a UAV that knows the place. A seed takes about five minutes on two cores.
     """
     if options["out"].suffix != ".npz":
         raise GarlError(f"--out: found {str(options['out'])!r}, expected a name that ends in .npz")
