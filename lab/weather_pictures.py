@@ -1,4 +1,4 @@
-"""Draw the contact sheets of docs/weather.md: both maps, each gene, from 10 m and from 2 m."""
+"""Draw the contact sheets of docs/weather.md: both maps, each gene, from 10 m and from 2.5 m."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ VIEW_PX = (140, 105)
 
 
 def sheet(name: str) -> np.ndarray:
-    """Return one map's sheet: each cell is the view from 10 m over that from 2 m."""
+    """Return one map's sheet: each cell is the view from 10 m over that from 2.5 m."""
     map = load_map(name)
     genome = genome_for(map, weather="full")
     clear = decode(genome.nominal, genome, map=name, seed=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,6 +19,29 @@ from tests.support.warm_python import COLD
 
 SUPPORT = Path(__file__).with_name("support") / "other_systems"
 SEARCH = ("--garl-budget=8", "--garl-workers=2", "--garl-shrink=0", "--garl-population=4")
+LANDER = Path(__file__).parents[1] / "docs" / "your-stack" / "mavlink_lander.py"
+FLIES_A_PROGRAM = """
+import sys
+
+from pytest_garl import CompanionProgram
+from pytest_garl.npcs.policy_catalogue import policy_spec
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.search.probes import clear_scenario
+from pytest_garl.npcs.domain_policy import domain_with_policy
+from pytest_garl.scenarios.task import Start, Task
+from pytest_garl.simulation.fly import fly
+
+lander = CompanionProgram(
+    f"{sys.executable} mavlink_lander.py --marker {{marker_id}} --north {{north_m}} "
+    "--east {east_m} --altitude {search_altitude_m} --focal {focal_px} "
+    "--dictionary {marker_dictionary}",
+)
+map = load_map("lawn")
+task = Task(marker=map.marker, start=Start())
+scenario = clear_scenario(map, task, domain_with_policy("calm", "."))
+flight = fly(scenario, lander, policy_spec("stationary"), map=map)
+print(flight.outcome, flight.touchdown)
+"""
 
 
 def start(system: str, folder: Path, *command: str, **more: str) -> subprocess.Popen[str]:
@@ -71,6 +95,16 @@ def test_search_on_macos_finds_what_it_finds_on_linux(lander: str, tmp_path: Pat
         assert status == 1, output
         results |= set(re.findall(r"results [0-9a-f]{16}", output))
     assert len(results) == 1
+
+
+def test_companion_program_flies_on_macos_as_on_linux(tmp_path: Path) -> None:
+    pytest.importorskip("pymavlink")
+    shutil.copy(LANDER, tmp_path)
+    (tmp_path / "flies.py").write_text(FLIES_A_PROGRAM)
+    flown = [run(system, tmp_path, "flies.py") for system in ("linux", "macos")]
+    assert flown[0][0] == 0, flown[0][1]
+    assert flown[0][1].startswith("landed ")
+    assert flown[0] == flown[1]
 
 
 def test_call_that_hangs_is_found_on_macos_with_its_stack(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ _SPEC_OPTIONS = (
         type=click.IntRange(min=1),
         default=100,
         show_default=True,
-        help="Scenarios per map. A worse rate fails only if at least six of them broke.",
+        help="Scenarios per map. A worse rate fails only if at least five of them broke.",
     ),
     click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True),
     click.option(

@@ -80,7 +80,7 @@ class _Project:
 def cases(context: click.Context, folder: Path) -> None:
     """Show, replay and manage saved violations.
 
-    A case is a file under scenarios/regressions/<system>/. Run these commands where you run pytest.
+    A case is a file under scenarios/regressions/<module>/. Run these commands where you run pytest.
     """
     root = Path.cwd()
     named = context.get_parameter_source("folder") is ParameterSource.COMMANDLINE

@@ -130,6 +130,7 @@ def init(system: str, *, example: bool, adapter: bool) -> None:
     if adapter:
         found, system = system, adapter_name(_imported_class(system))
         steps.append(_write(here / f"{system.partition(':')[0]}.py", adapter_of(found)))
+    states_marker = bool(system)
     if not system:
         system = SKELETON
         steps.append(_write_skeleton(here / f"{SKELETON.partition(':')[0]}.py"))
@@ -143,7 +144,7 @@ def init(system: str, *, example: bool, adapter: bool) -> None:
         # The import says what is wrong with the name before anything is written with it.
         imported_system(system)
         module = system.partition(":")[0].rpartition(".")[2]
-        name, text = re.sub(r"\W", "_", module), _test_of(system, adapter=adapter)
+        name, text = re.sub(r"\W", "_", module), _test_of(system, states_marker=states_marker)
         needs_path = _needs_path(system, folder, here)
     test = folder / f"test_{name}.py"
     wanted = SETTINGS | (PYTHONPATH if needs_path else {})
@@ -159,12 +160,22 @@ def _show(steps: Sequence[_Step], test: Path, here: Path) -> None:
     """Print what was done and what to run next."""
     for step in steps:
         click.echo(f"{step.done:<10} {step.file.relative_to(here)}")
-    click.echo("\nThen run:")
     shown = test.relative_to(here)
+    marked = [each.file for each in steps if each.file.suffix == ".py" and _is_marked(each.file)]
+    if marked:
+        names = " and ".join(str(file.relative_to(here)) for file in marked)
+        click.echo(f"\nIn {names} change the lines with <-. Then run:")
+    else:
+        click.echo("\nThen run:")
     click.echo(f"    {command('garl', 'check', shown)}")
     click.echo("        flies it in clear air and names its faults")
     click.echo(f"    {command('pytest', '--garl-budget=40', shown)}")
     click.echo("        searches: 40 flights on each map, saved cases in scenarios/regressions")
+
+
+def _is_marked(file: Path) -> bool:
+    """Return whether a file has lines for its owner to change."""
+    return "# <-" in file.read_text()
 
 
 def _needs_path(system: str, folder: Path, here: Path) -> bool:
@@ -194,12 +205,15 @@ def _imported_class(name: str) -> str:
     raise GarlError(f"--adapter: {name} has reset and step: garl init {name} writes its tests")
 
 
-def _test_of(system: str, *, adapter: bool) -> str:
-    """Return the tests of a landing system, named as MODULE:CLASS."""
+def _test_of(system: str, *, states_marker: bool) -> str:
+    """Return the tests of a landing system, named as MODULE:CLASS.
+
+    The one to begin with lands on the marker that the mission names.
+    """
     module, _, qualified = system.partition(":")
-    imports = IMPORT_WITH_MARKER if adapter else IMPORT
+    imports = IMPORT_WITH_MARKER if states_marker else IMPORT
     head = imports.format(module=module, name=qualified.partition(".")[0])
-    return head + (WITH_MARKER if adapter else MARKED).format(system=qualified) + TESTS
+    return head + (WITH_MARKER if states_marker else MARKED).format(system=qualified) + TESTS
 
 
 def _test_of_program(line: str, here: Path, folder: Path) -> str:

@@ -53,7 +53,7 @@ TARGET_FOR_S = 1.0
 QUIET_S: float | None = 1.5
 STACK_S = 0.1
 """After so much wall time a program is asked where it is, and so long it has to say it."""
-ASKED = signal.SIGRTMAX - 1
+ASKED = signal.SIGRTMAX - 1 if hasattr(signal, "SIGRTMAX") else signal.SIGUSR2
 NOTE_CHARS = 900
 FARTHEST_M = 100.0
 _HEADER = struct.Struct("!cI")

@@ -147,14 +147,24 @@ def saved_lines(run: Run, config: pytest.Config) -> list[str]:
         lines.append("Nothing in the tree was changed (CI is set). To keep the cases:")
         lines.append(" \\\n        ".join(["    git apply", *patches]))
     elif files:
+        gating = [each.file for each in investigated if each.result.case and each.result.case.gates]
+        lines += _begin_with([file for file in gating if file is not None], config)
         hint = (
             "New cases that gate fail until they are fixed, committed, or accepted with `garl "
-            "cases accept FILE`. `garl cases show FILE` says more about a case, and `garl film "
-            "FILE` shows it."
+            "cases accept FILE`."
         )
         lines.append(wrapped(hint, width))
     shrink = None if run.options.shrink_capped else run.options.shrink
     return [*lines, *_not_shrunk(investigated, shrink, width)]
+
+
+def _begin_with(gating: Sequence[Path], config: pytest.Config) -> list[str]:
+    """Return which case to look at first: of those that gate the one of the most frequent kind."""
+    if not gating:
+        return []
+    show = command("garl", "cases", "show", shown_path(gating[0], config))
+    which = "The first of them that gates" if len(gating) > 1 else "It gates"
+    return [f"{which}: {show}", f"  as a film: {command('garl', 'film', gating[0].stem)}"]
 
 
 def _lines_about(each: InvestigatedSignature, config: pytest.Config, width: int) -> list[str]:

@@ -85,8 +85,8 @@ def check_names(changes: Mapping[str, float]) -> None:
             near = get_close_matches(str(name).upper(), known, n=1)
             hint = f"; did you mean {near[0]}?" if near else ""
             raise LandingSystemError(
-                f"parameters: found {name!r}, which nothing here reads{hint} "
-                "(docs/your-stack.md says which do)"
+                f"parameters: found {name!r}, which nothing here reads{hint}; it reads "
+                + ", ".join(sorted(known))
             )
         if not isinstance(value, int | float) or not math.isfinite(value):
             raise LandingSystemError(f"parameters: {name} = {value!r}: expected a finite number")

@@ -21,7 +21,7 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 NAME = "_garl_inside"
-ASKED = signal.SIGRTMAX - 1
+ASKED = signal.SIGRTMAX - 1 if hasattr(signal, "SIGRTMAX") else signal.SIGUSR2
 """The simulator's question where the program is, when it computes for long."""
 HEADER = struct.Struct("!cI")
 MOST_PRINTED = 2_000
