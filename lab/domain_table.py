@@ -5,6 +5,7 @@ The ranges are those of ``pytest_garl/scenarios/domains/*.toml``.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from pytest_garl.cli.domain_command import range_in_words, ranges_of
@@ -14,6 +15,7 @@ from pytest_garl.scenarios.domains.names import BUILT_IN
 
 PAGE = Path(__file__).parents[1] / "docs" / "domain.md"
 BEGIN = "<!-- table of the built-in domains: python -m lab.domain_table -->\n"
+ALIKE = re.compile(r"-\d\b")
 END = "<!-- end of the table -->\n"
 
 
@@ -31,9 +33,10 @@ def table() -> str:
                 range_in_words(key, *ranges[name][key]) if key in ranges[name] else "–"
                 for name in BUILT_IN
             ]
-            lines.append(f"| `{key}` | {' | '.join(cells)} |")
+            lines.append(f"| `{ALIKE.sub('-N', key)}` | {' | '.join(cells)} |")
     moved = [each.npc_behaviour for each in domains.values()]
-    return "\n".join([*lines, f"| NPCs at most | {' | '.join(moved)} |"]) + "\n"
+    # Rows of objects that differ by their number only are one.
+    return "\n".join([*dict.fromkeys(lines), f"| NPCs at most | {' | '.join(moved)} |"]) + "\n"
 
 
 def with_table(page: str) -> str:
