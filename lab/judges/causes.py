@@ -24,8 +24,6 @@ from lab.judges.intervals import mean_of, over_pairs, p_of_signs
 from lab.judges.tasks import FOLDER
 from lab.one_search import flights_of, plan_of
 from lab.table import ResultTable, Row
-from pytest_garl.cases.case_flights import find_colliding_object
-from pytest_garl.cases.shrink import shrink
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.flight.flight_file import load
@@ -34,6 +32,8 @@ from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import children_in
+from pytest_garl.shrinking.case_flights import find_colliding_object
+from pytest_garl.shrinking.shrink import shrink
 
 FLIGHTS = 400
 SEEDS = tuple(range(20, 25))

@@ -18,8 +18,6 @@ from lab.judges.flights import MAPS, Flights, flights_for, fly_each, named
 from lab.judges.intervals import over_pairs
 from lab.one_search import flights_of
 from lab.table import ResultTable, Row, share
-from pytest_garl.cases.case_request import CaseRequest
-from pytest_garl.cases.investigation import build_case
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
@@ -33,6 +31,8 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, STORY_MOMENTS
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.method import FlownScenario, SearchPlan
+from pytest_garl.shrinking.case_request import CaseRequest
+from pytest_garl.shrinking.investigation import build_case
 
 FLIGHTS, GENERATION = 100, 10
 SEEDS = (20,)

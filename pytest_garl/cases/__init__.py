@@ -1,1 +1,1 @@
-"""Saved cases: violations that are confirmed, shrunk, saved and flown before every merge."""
+"""Saved cases: their file, the folder of all of them, what they say, and their flight today."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pytest_garl.cases.case import Violation
 from pytest_garl.cases.story_text import story_in_words
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.flight.flight import Flight, ObjectRecord
@@ -133,4 +134,23 @@ def scenario_in_words(
     return "; ".join(
         f"{subject} {words}" if "." in subject or words.startswith(("at ", "a ")) else words
         for subject, words in describe_scenario(scenario, map_folders, policy)
+    )
+
+
+def violation_in(
+    verdict: Verdict, flight: Flight | None, severity: Severity, *, is_shrunk: bool
+) -> Violation:
+    """Return the violation that a verdict found."""
+    assert verdict.primary is not None
+    assert verdict.violation_type is not None
+    margin = next((each for each in verdict.margins if each.property == verdict.primary), None)
+    return Violation(
+        signature=verdict.signature,
+        type=verdict.violation_type,
+        property=verdict.primary,
+        margin=margin.value if margin else 0.0,
+        unit=margin.unit if margin else "1",
+        description=describe(flight, verdict, severity, is_shrunk=is_shrunk)
+        if flight
+        else verdict.story,
     )

@@ -14,7 +14,7 @@ from typing import Literal
 
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.collected_tests import CollectedProject
-from pytest_garl.cases.new_case import violation_in
+from pytest_garl.cases.description import violation_in
 from pytest_garl.cases.reference_proofs import with_sources
 from pytest_garl.cases.replay import SourceHashes, system_of
 from pytest_garl.errors import GarlError

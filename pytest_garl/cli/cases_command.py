@@ -292,8 +292,8 @@ def shrink(project: _Project, file: Path, flights: int, workers: int, *, as_it_f
     moves, size, neighbours that fail) and better in at least one. The new file is named by what it
     holds, so it may have another name.
     """
-    from pytest_garl.cases.reshrink import NOTHING_SIMPLER, shrink_case
     from pytest_garl.plugin.case_tests import case_setup
+    from pytest_garl.shrinking.reshrink import NOTHING_SIMPLER, shrink_case
 
     case = project.case(file)
     if as_it_fails and (case.status != "open" or case.assertion):

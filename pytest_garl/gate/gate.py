@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 
-from pytest_garl.cases.robustness import NEIGHBOURS, neighbours
 from pytest_garl.errors import BaselineError
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.gate.baseline_file import BaselineSet
@@ -12,6 +11,7 @@ from pytest_garl.gate.comparison import LEVEL, Comparison, compare
 from pytest_garl.gate.pairs import FlightSummary, Pair, summary_of
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.shrinking.robustness import NEIGHBOURS, neighbours
 
 FlyScenarios = Callable[[Sequence[Scenario]], Sequence[CompletedFlight]]
 """Flies scenarios with the changed landing system."""

@@ -10,12 +10,12 @@ import pytest
 
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.case_test_run import pytest_arguments, single_case_corpus
-from pytest_garl.cases.reshrink import CaseSetup
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.execution.sources import data_files
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.user_assertions import ItemAssertion
+from pytest_garl.shrinking.reshrink import CaseSetup
 
 _IGNORE_IMPORTED = "ignore::pytest.PytestAssertRewriteWarning"
 """pytest warns that this package is imported already; a project may turn warnings into errors."""

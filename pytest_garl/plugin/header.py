@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import pytest
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.cases.forecast import flight_times_with_shrinking, seconds_per_new_signature
 from pytest_garl.engine import chosen
 from pytest_garl.files.run_files import RUN_FOLDER, SEARCH_LEDGER
 from pytest_garl.messages import command
@@ -16,6 +15,7 @@ from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import counted, duration
 from pytest_garl.plugin.time_left import FIRST_FLIGHTS
 from pytest_garl.search.method_catalogue import method_names
+from pytest_garl.triage.forecast import flight_times_with_shrinking, seconds_per_new_signature
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 from pytest_garl.verdicts.wording import limits_text
 

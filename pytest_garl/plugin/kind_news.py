@@ -8,12 +8,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from pytest_garl.cases.case_request import CaseRequest, CaseResult
 from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import duration, wrapped, write_lines
 from pytest_garl.plugin.time_left import NewKinds, TimeLeft
+from pytest_garl.shrinking.case_request import CaseRequest, CaseResult
 from pytest_garl.verdicts.wording import headline
 
 PERIOD_S = 1.0

@@ -38,7 +38,7 @@ SHRINK = 12
 """Flights for each new kind of violation: enough for the barest scenario, its neighbours, an escape
 and a shorter record of moves."""
 MINIMUM_SHRINK = 8
-"""``investigation.MINIMUM_CASE_FLIGHTS``, whose module takes long to import."""
+"""``shrinking.plan.LEAST``, whose module takes long to import."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,9 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_garl.cases.case_request import CaseRequest
 from pytest_garl.cases.corpus import Corpus
-from pytest_garl.cases.new_signatures import request_of
 from pytest_garl.engine import chosen
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import FIRST_SLOT, CompletedFlight, search_key
@@ -44,6 +42,8 @@ from pytest_garl.scenarios.domains.own_navigation import within
 from pytest_garl.scenarios.files import dumps
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.shrinking.case_request import CaseRequest
+from pytest_garl.triage.new_signatures import request_of
 from pytest_garl.verdicts.verdict import Verdict
 from pytest_garl.verdicts.wording import headline
 

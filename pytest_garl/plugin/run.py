@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, TextIO
 
 import pytest
 
-from pytest_garl.cases.known_kinds import KnownCase, KnownCaseMatch, KnownKinds
 from pytest_garl.cases.reference_proofs import Proofs, proves_reference
 from pytest_garl.cases.replay import SourceHashes, stale_reasons
 from pytest_garl.errors import LedgerError
@@ -33,13 +32,14 @@ from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.archive import Archive
 from pytest_garl.simulation.npc_policy import PolicySpec
+from pytest_garl.triage.known_kinds import KnownCase, KnownCaseMatch, KnownKinds
 
 if TYPE_CHECKING:
     from pytest_garl.cases.corpus import Corpus
-    from pytest_garl.cases.follow_up import InvestigatedSignature
-    from pytest_garl.cases.forecast import RemainingWork
-    from pytest_garl.cases.investigation_queue import Investigations
     from pytest_garl.plugin.user_assertions import ItemAssertion
+    from pytest_garl.triage.follow_up import InvestigatedSignature
+    from pytest_garl.triage.forecast import RemainingWork
+    from pytest_garl.triage.investigation_queue import Investigations
 
 REFLIGHTS = 4
 """A violation of a system that need not be deterministic is flown so many times more."""

@@ -11,9 +11,6 @@ from typing import Any
 import pytest
 
 from pytest_garl.cases.case import Case
-from pytest_garl.cases.case_request import CaseRequest
-from pytest_garl.cases.follow_up import InvestigatedSignature, follow_up
-from pytest_garl.cases.investigation_queue import Investigations
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import command
 from pytest_garl.plugin.kind_news import write_last_news
@@ -25,6 +22,9 @@ from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import begin_line, counted, duration, width_of, wrapped
 from pytest_garl.plugin.user_assertions import collect_assertion
 from pytest_garl.plugin.xdist import is_xdist_worker
+from pytest_garl.shrinking.case_request import CaseRequest
+from pytest_garl.triage.follow_up import InvestigatedSignature, follow_up
+from pytest_garl.triage.investigation_queue import Investigations
 
 _PATCH = ".patch"
 

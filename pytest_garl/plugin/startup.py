@@ -31,7 +31,7 @@ from pytest_garl.process_tree import alive
 from pytest_garl.search.archive import Archive, read_archive
 
 if TYPE_CHECKING:
-    from pytest_garl.cases.investigation_queue import Investigations
+    from pytest_garl.triage.investigation_queue import Investigations
 
 
 def begin_run(config: pytest.Config, options: Options) -> None:
@@ -166,8 +166,8 @@ def _investigations(
     if is_xdist_worker(config) or not options.budget or options.repeat or not options.shrink:
         return None
     # Only a search needs Hypothesis, which shrinks.
-    from pytest_garl.cases.allowance import ShrinkBudget
-    from pytest_garl.cases.investigation_queue import Investigations
+    from pytest_garl.triage.allowance import ShrinkBudget
+    from pytest_garl.triage.investigation_queue import Investigations
 
     shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
     return Investigations(ledger, pool, corpus_of(config, options), shrinking, options.workers or 1)

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from pytest_garl.cases.forecast import RemainingWork, expected_kinds, flights_after_search
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import FlightSeconds
 from pytest_garl.plugin.run import Run
+from pytest_garl.triage.forecast import RemainingWork, expected_kinds, flights_after_search
 
 FIRST_FLIGHTS = 20
 """The time left is forecast after this number of flights.  After eight, no kind had shown in a

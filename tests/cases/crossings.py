@@ -8,9 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl.cases.case_request import CaseRequest
-from pytest_garl.cases.simplification import without_other_objects
-from pytest_garl.cases.straight_crossing import Encounter, straight_crossing
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot
 from pytest_garl.execution.fly_and_judge import fly_job
 from pytest_garl.execution.job import FlightJob
@@ -22,6 +19,9 @@ from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
+from pytest_garl.shrinking.case_request import CaseRequest
+from pytest_garl.shrinking.simplification import without_other_objects
+from pytest_garl.shrinking.straight_crossing import Encounter, straight_crossing
 from pytest_garl.simulation.fly import fly
 
 LAWN = load_map("lawn")

@@ -9,13 +9,13 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from pytest_garl.cases.simplification import empty_scenario
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.files import dump_scenario, parse_scenario
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.shrinking.simplification import empty_scenario
 from tests.cases.samples import JOB, LAWN, case, violating_scenario
 from tests.support.results import flight_result
 

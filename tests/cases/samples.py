@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from pytest_garl.cases.case import Case, CaseEvidence, Violation
-from pytest_garl.cases.case_request import CaseRequest
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import Reference
@@ -21,6 +20,7 @@ from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.units import snapped
 from pytest_garl.scenarios.validity import repair
+from pytest_garl.shrinking.case_request import CaseRequest
 from pytest_garl.verdicts.verdict import Limits
 from tests.support.results import flight_result
 

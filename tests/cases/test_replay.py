@@ -11,7 +11,6 @@ import pytest
 
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.case_file import dump_case
-from pytest_garl.cases.case_flights import recorded_behaviour
 from pytest_garl.cases.case_test_run import CaseTestResult
 from pytest_garl.cases.replay import (
     Replay,
@@ -22,6 +21,7 @@ from pytest_garl.cases.replay import (
 )
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.flight.flight_file import save
+from pytest_garl.shrinking.case_flights import recorded_behaviour
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.cases.samples import case

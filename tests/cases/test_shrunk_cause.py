@@ -8,9 +8,9 @@ import pytest
 
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.shrunk_cause import Cause, cause_of_case
-from pytest_garl.cases.simplification import empty_scenario
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.shrinking.simplification import empty_scenario
 from tests.cases.samples import LAWN, OBJECT_NAMES, case, violating_scenario
 
 NOTHING = empty_scenario(violating_scenario(), LAWN)

@@ -14,7 +14,6 @@ from click.testing import CliRunner
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.corpus import Corpus, replace_file
 from pytest_garl.cases.replay import Replay
-from pytest_garl.cases.reshrink import CaseSetup
 from pytest_garl.cli import main
 from pytest_garl.cli import named_flight as module
 from pytest_garl.cli.named_flight import FlightName, NamedFlight
@@ -24,6 +23,7 @@ from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import save
 from pytest_garl.plugin import case_tests
 from pytest_garl.scenarios.files import dumps
+from pytest_garl.shrinking.reshrink import CaseSetup
 from tests.cases.samples import LAWN
 from tests.cases.samples import case as dog_case
 from tests.reports.html.test_report import lost

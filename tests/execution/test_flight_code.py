@@ -57,7 +57,7 @@ def test_what_flies_and_judges_no_case_does_not_matter(copy: Path, here: str) ->
         "execution/severity.py",
         "execution/worker.py",
         "plugin/summary.py",
-        "cases/shrink.py",
+        "shrinking/shrink.py",
         "scenarios/domains/field.toml",
         "search/breeder.py",
     ):

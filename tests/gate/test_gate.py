@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.cases.robustness import neighbours
 from pytest_garl.errors import BaselineError
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.gate.gate import compare_flights, compare_sets
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.shrinking.robustness import neighbours
 from tests.gate.samples import DOG, LAWN, baseline_set
 from tests.support.results import flight_result
 

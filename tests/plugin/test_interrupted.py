@@ -139,7 +139,7 @@ def test_sigterm_while_kinds_are_shrunk_saves_what_has_ended_and_names_the_way_t
     slow_project(pytester)
     conftest = (
         "import os, signal\n"
-        "from pytest_garl.cases.investigation_queue import Investigations\n"
+        "from pytest_garl.triage.investigation_queue import Investigations\n"
         "def end(*args):\n"
         "    os.kill(os.getpid(), signal.SIGTERM)\n"
         f"Investigations.{method} = end\n"

@@ -7,9 +7,9 @@ import re
 
 import pytest
 
-from pytest_garl.cases.case_request import CaseResult
 from pytest_garl.execution.severity import Severity
 from pytest_garl.plugin.kind_news import _shrunk
+from pytest_garl.shrinking.case_request import CaseResult
 from tests.cases.samples import case, make_case_request
 from tests.plugin.test_progress_display import on_a_terminal, screen
 from tests.support.landing_project import project, run

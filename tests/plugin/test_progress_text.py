@@ -8,13 +8,13 @@ from typing import cast
 
 import pytest
 
-from pytest_garl.cases.forecast import RemainingWork, flights_after_search
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import FlightSeconds, SearchProgress
 from pytest_garl.plugin import progress_text
 from pytest_garl.plugin.progress_text import ProgressReader, RunProgress, progress_line
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.time_left import FIRST_FLIGHTS, NewKinds
+from pytest_garl.triage.forecast import RemainingWork, flights_after_search
 
 TWO = (
     SearchProgress(search="s", system="m:A", map="court", flown=3, total=4, generation=1),

@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 from pytest_garl.cases.case_file import dump_case, load_case
-from pytest_garl.cases.shrink import BISECTIONS
+from pytest_garl.shrinking.shrink import BISECTIONS
 from tests.support.case_project import (
     CASES,
     SEARCH,

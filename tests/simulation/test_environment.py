@@ -9,7 +9,6 @@ import pytest
 
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
 from pytest_garl.cases.case import RecordedBehaviour
-from pytest_garl.cases.case_flights import recorded_behaviour
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load, save
@@ -21,6 +20,7 @@ from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import random_scenarios
+from pytest_garl.shrinking.case_flights import recorded_behaviour
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.environment import changed, environment_at
 from pytest_garl.simulation.fly import fly

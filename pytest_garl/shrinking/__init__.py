@@ -1,0 +1,1 @@
+"""How simple a violation can be, and whether anybody could have prevented it: see ``plan.py``."""

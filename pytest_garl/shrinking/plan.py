@@ -1,0 +1,79 @@
+"""The plan of an investigation: its steps, the flights that each takes, and those that it keeps.
+
+An investigation turns a violation of a search into a case: a scenario that is as simple as can be
+found, that fails again when its objects repeat recorded moves, and of which slightly different
+scenarios fail too.  Each flight costs seconds, so it has a budget of some twelve, and the order of
+its steps is that of what a reader gains:
+
+1. *Idle conditions* go first: what the landing system never read is no cause.  No flight.
+2. A collision: *a straight crossing*.  The body crosses the place of the contact, careless, in
+   clear air.  Nothing simpler can hit a UAV.  The window of its entry is measured in place of
+   neighbours.
+3. A collision that needs more: *a lower grade* of the body, alone, tried downwards.
+4. *The bare scenario*: only what was hit, in clear air, with the search's policy, then with the
+   recorded moves, then in the conditions that were found.
+5. *The scenario as found*, and those of further violations, until all neighbours of one fail.
+6. *Shrinking* of the best of these (``shrink.py``).  A failure without a collision begins here,
+   because its objects are dropped first of all.
+7. *A shorter record* of the moves.
+8. *Escapes*: could anybody have prevented the collision?  (``prevention.py``)
+
+A step is left out if fewer flights are left than it takes and keeps.  Every step keeps those for
+the scenario as found with its neighbours, so that no violation is lost because a simpler one was
+looked for.
+
+An example with twelve flights: a dog is hit.  Three are kept for escapes, nine are left.  The
+crossing hits (1).  Its record is flown (1), and its entry is moved by one and two seconds in both
+directions (4).  Two attempts confirm an escape (2).  The case took eight flights.
+
+A saved case that is to become simpler (``reshrink.py``) begins with its own record, then takes
+steps 6 to 8.  A Python exception or a hang takes two flights: without anything, and as found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pytest_garl.shrinking.robustness import NEIGHBOURS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """The flights that a step takes at most before it is known to find nothing, and those it keeps.
+
+    ``keeps`` are for the steps after it.
+    """
+
+    takes: int
+    keeps: int
+
+    @property
+    def needs(self) -> int:
+        """The flights without which the step is left out."""
+        return self.takes + self.keeps
+
+
+CONFIRM = 1 + NEIGHBOURS
+"""A scenario with recorded moves, and its neighbours."""
+ESCAPES = 3
+"""Kept from the start if a moving body was hit: two attempts from the latest state with a plan, and
+one from the state shortly after the body was observable."""
+
+CROSSING = Step(takes=1, keeps=CONFIRM)
+LOWER_GRADE = Step(takes=1, keeps=2 + CONFIRM)
+BARE_BY_POLICY = Step(takes=2, keeps=CONFIRM)
+BARE_BY_RECORD = Step(takes=1, keeps=CONFIRM)
+AS_FOUND = Step(takes=CONFIRM, keeps=0)
+SHORTER_RECORD = Step(takes=CONFIRM, keeps=0)
+
+LEAST = 1 + CONFIRM + ESCAPES
+"""The fewest flights that can confirm a violation: one of a straight crossing or of the scenario
+without all that the failure should not need, the scenario as found with its neighbours, escapes."""
+ANOTHER_AS_FOUND = Step(takes=CONFIRM, keeps=LEAST)
+"""A further violation is flown only if the best one so far can still be shrunk."""
+LEAST_OF_SAVED = 2 + CONFIRM + ESCAPES
+"""The fewest flights that can improve a saved case: one of it as it is, one of a simpler scenario,
+that scenario with recorded moves and its neighbours, escapes."""
+EXCEPTION = 2
+"""A Python exception or a hang hardly depends on the scenario: one flight of the scenario without
+objects and weather, one of the scenario as found."""
