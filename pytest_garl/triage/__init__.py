@@ -16,8 +16,7 @@ flights:
 
 The order depends on the flights alone, never on when one has ended, so that any number of workers
 makes the same cases.  What is left to fly is forecast for the progress line (``forecast.py``).
-
-For example a search of 16 flights has seven violations of five kinds.  Their investigations have 16
-flights together by default.  The first gets 12 and gives back what it does not use.  A kind that the
-rest cannot confirm is named in the summary as "not shrunk".
+ For example a search of 16 flights has seven violations of five kinds.  Their investigations have
+16 flights together by default.  The first gets 12 and gives back what it does not use.  A kind that
+the rest cannot confirm is named in the summary as "not shrunk".
 """
