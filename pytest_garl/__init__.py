@@ -31,7 +31,7 @@ _HOMES = {
         "VehicleState",
         "VelocitySetpoint",
     ),
-    "pytest_garl.plugin.landing": ("Landing",),
+    "pytest_garl.plugin.items.landing": ("Landing",),
     "pytest_garl.scenarios.task": ("Start",),
     "pytest_garl.flight.flight": ("Flight",),
     "pytest_garl.simulation.npc_policy": ("Move", "PolicySpec", "Situation"),

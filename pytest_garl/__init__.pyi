@@ -20,7 +20,7 @@ from pytest_garl.landing_system import (
     VehicleState,
     VelocitySetpoint,
 )
-from pytest_garl.plugin.landing import Landing
+from pytest_garl.plugin.items.landing import Landing
 from pytest_garl.reports.film import save_video
 from pytest_garl.scenarios.task import Start
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation

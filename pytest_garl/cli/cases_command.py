@@ -35,7 +35,7 @@ from pytest_garl.messages import command, printable
 
 if TYPE_CHECKING:
     from pytest_garl.cases.renewal import Renewal
-    from pytest_garl.plugin.project_collection import ProjectTests
+    from pytest_garl.plugin.items.project_collection import ProjectTests
 
 NO_PROOF = 3
 """Exit status of a replay that proves nothing."""
@@ -65,7 +65,7 @@ class _Project:
 
     def collected(self) -> tuple[ProjectTests, Corpus]:
         """Return the landing tests, and the corpus that pytest flies, or that of ``--folder``."""
-        from pytest_garl.plugin.project_collection import collect_project
+        from pytest_garl.plugin.items.project_collection import collect_project
 
         tests = collect_project(self.root, self.corpus.folder if self.named else None)
         folder = tests.cases
@@ -292,7 +292,7 @@ def shrink(project: _Project, file: Path, flights: int, workers: int, *, as_it_f
     moves, size, neighbours that fail) and better in at least one. The new file is named by what it
     holds, so it may have another name.
     """
-    from pytest_garl.plugin.case_tests import case_setup
+    from pytest_garl.plugin.items.case_tests import case_setup
     from pytest_garl.shrinking.reshrink import NOTHING_SIMPLER, shrink_case
 
     case = project.case(file)

@@ -125,7 +125,7 @@ def _planned(target: str, maps: tuple[str, ...]) -> Iterator[tuple[AnySystem, Ch
 
 def _planned_for_tests(target: str, maps: tuple[str, ...]) -> Iterator[tuple[AnySystem, CheckPlan]]:
     """Yield what the tests in a file fly; several tests of one landing system fly it once."""
-    from pytest_garl.plugin.tests_of_file import targets_of
+    from pytest_garl.plugin.items.tests_of_file import targets_of
     from pytest_garl.scenarios.maps.loading import load_map
     from pytest_garl.testing import CheckPlan
 

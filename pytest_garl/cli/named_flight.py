@@ -119,7 +119,7 @@ class FlightName:
             found, reason = self._recorded_case(case)
             if found is not None:
                 return found
-        from pytest_garl.plugin.case_tests import case_setup
+        from pytest_garl.plugin.items.case_tests import case_setup
 
         unseen = why_no_camera(case_setup(case, root).simulator.name)
         if unseen and pictures:

@@ -1,5 +1,7 @@
 """The pytest plugin; no other part of the package imports pytest.
 
+Three rooms lie below: ``items``, what there is to test; ``session``, what happens while it runs;
+and ``terminal``, what is shown.  A room imports those before it, and ``hooks`` imports them all.
 The modules, in the order in which a session needs them:
 
 1. ``hooks`` has the hooks of pytest and delegates.  Every pytest run imports it, with ``arguments``

@@ -10,7 +10,6 @@ import pytest
 
 from pytest_garl.errors import GarlError, check_platform
 from pytest_garl.plugin import hookspecs
-from pytest_garl.plugin.abort import abort_if_fatal, drop_entries_without_line, fail_report
 from pytest_garl.plugin.arguments import (
     add_options,
     check_keys,
@@ -18,8 +17,8 @@ from pytest_garl.plugin.arguments import (
     flies_itself,
     is_enabled,
 )
-from pytest_garl.plugin.fixtures import garl_slot, landing, npcs, scenario
-from pytest_garl.plugin.keys import (
+from pytest_garl.plugin.items.abort import abort_if_fatal, drop_entries_without_line, fail_report
+from pytest_garl.plugin.items.keys import (
     BODY_RUNS,
     COLLECTED,
     GATE_PLUGIN,
@@ -36,8 +35,9 @@ from pytest_garl.plugin.keys import (
     target_of,
     without_landing,
 )
-from pytest_garl.plugin.lost_cases import Collected
-from pytest_garl.plugin.tally import Tally, noted_in
+from pytest_garl.plugin.items.lost_cases import Collected
+from pytest_garl.plugin.session.fixtures import garl_slot, landing, npcs, scenario
+from pytest_garl.plugin.session.tally import Tally, noted_in
 from pytest_garl.plugin.xdist import CONTROLLER, SEED, WIDTH, is_xdist_worker
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
@@ -92,22 +92,22 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(config.stash[COLLECTED], "garl_collected")
     if not is_enabled(config):
         return
-    from pytest_garl.plugin.option_checks import check_usage
+    from pytest_garl.plugin.items.option_checks import check_usage
     from pytest_garl.plugin.options import options_of
 
     options = options_of(config)
     check_usage(options)
     if options.repeat:
-        from pytest_garl.plugin.repeated import read_repeated
+        from pytest_garl.plugin.items.repeated import read_repeated
 
         # What cannot be read ends the session before anything is collected or flown.
         config.stash[REPEATED] = read_repeated(options)
     if options.baseline is not None:
-        from pytest_garl.plugin.baseline_gate import register
+        from pytest_garl.plugin.session.baseline_gate import register
 
         register(config, options)
     if options.budget and not options.repeat and options.probes != "never":
-        from pytest_garl.plugin.probe_items import ProbesPlugin
+        from pytest_garl.plugin.session.probe_items import ProbesPlugin
 
         config.pluginmanager.register(ProbesPlugin(options), "garl_probes")
     if options.searches_or_repeats and not config.option.collectonly:
@@ -125,7 +125,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, 
         if any(marker_among(call.marks) for call in metafunc._calls):
             raise pytest.Collector.CollectError(without_landing(metafunc.definition))
         return result
-    from pytest_garl.plugin.collection import make_items
+    from pytest_garl.plugin.items.collection import make_items
 
     with make_items(metafunc, marker):
         return (yield)
@@ -153,7 +153,7 @@ def pytest_collection_modifyitems(
     """Put an item before the others for each saved case that nothing can fly any more."""
     collected = config.stash[COLLECTED]
     if collected.tests:
-        from pytest_garl.plugin.lost_cases import lost_case_items
+        from pytest_garl.plugin.items.lost_cases import lost_case_items
         from pytest_garl.plugin.options import options_of
 
         try:
@@ -169,11 +169,11 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     if config.option.collectonly:
         return
     if any(slot_of(item) is not None for item in session.items):
-        from pytest_garl.plugin.item_record import name_slots
+        from pytest_garl.plugin.items.item_record import name_slots
 
         name_slots(session.items)
     if is_enabled(config) and not is_xdist_worker(config):
-        from pytest_garl.plugin.option_checks import check_selection
+        from pytest_garl.plugin.items.option_checks import check_selection
         from pytest_garl.plugin.options import options_of
 
         check_selection(options_of(config), session.items)
@@ -195,7 +195,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     run = session.config.stash.get(RUN, None)
     if run is None:
         return (yield)
-    from pytest_garl.plugin.progress_display import show_progress
+    from pytest_garl.plugin.terminal.progress_display import show_progress
     from pytest_garl.plugin.termination import telling_workers
 
     with show_progress(run, session.config), telling_workers(run.ledger):
@@ -210,7 +210,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]
     pyfuncitem.stash[BODY_RUNS] = True
     try:
         if LANDING in pyfuncitem.stash:
-            from pytest_garl.plugin.item_report import end_unjudged
+            from pytest_garl.plugin.session.item_report import end_unjudged
 
             end_unjudged(pyfuncitem)
         return (yield)
@@ -227,7 +227,7 @@ def pytest_runtest_makereport(
     target = target_of(item)
     run = item.config.stash.get(RUN, None)
     if target is not None and run is not None and (report.when == "call" or report.skipped):
-        from pytest_garl.plugin.item_report import report_item
+        from pytest_garl.plugin.session.item_report import report_item
 
         try:
             if report.when == "call":
@@ -272,7 +272,7 @@ def pytest_report_header(config: pytest.Config) -> str | None:
     run = config.stash.get(RUN, None)
     if run is None:
         return None
-    from pytest_garl.plugin.header import header
+    from pytest_garl.plugin.terminal.header import header
 
     return header(run, config)
 
@@ -282,7 +282,7 @@ def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
     run = config.stash.get(RUN, None)
     if run is None:
         return []
-    from pytest_garl.plugin.header import (
+    from pytest_garl.plugin.terminal.header import (
         acceptance_warning,
         domain_lines,
         forecast,
@@ -297,7 +297,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     tally = config.stash[TALLY]
     if not (RUN in config.stash or tally.items or tally.problems):
         return
-    from pytest_garl.plugin.terminal_summary import write_summary
+    from pytest_garl.plugin.terminal.terminal_summary import write_summary
 
     write_summary(terminalreporter, config, tally)
 
@@ -312,7 +312,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         _save_cases(run, session, nothing_compared=nothing_compared)
     if run is not None or gate is not None or is_enabled(session.config) or (tally and tally.items):
         from pytest_garl.plugin.options import options_of
-        from pytest_garl.plugin.session_status import set_exit_status
+        from pytest_garl.plugin.session.session_status import set_exit_status
 
         options = options_of(session.config)
         set_exit_status(session, run, tally, options, nothing_compared=nothing_compared)
@@ -320,15 +320,15 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 def _save_cases(run: Any, session: pytest.Session, *, nothing_compared: bool) -> None:
     try:
-        from pytest_garl.plugin.kind_news import write_last_news
-        from pytest_garl.plugin.save_cases import may_save, save_archive, save_cases
+        from pytest_garl.plugin.terminal.kind_news import write_last_news
+        from pytest_garl.plugin.terminal.save_cases import may_save, save_archive, save_cases
 
         write_last_news(run, session.config)
         save_archive(run, session)
         if may_save(run, session) and not nothing_compared:
             save_cases(run, session)
     except Exception as error:  # noqa: BLE001 (the summary, which follows, says what it was)
-        from pytest_garl.plugin.session_status import problem_text
+        from pytest_garl.plugin.session.session_status import problem_text
 
         # Without its ledger, for example, a session saves nothing.
         run.save_problem = run.save_problem or problem_text("what is saved", error)
@@ -365,6 +365,6 @@ def _begin_run(config: pytest.Config, options: Any) -> None:
         check_platform()
     except GarlError as error:
         raise pytest.UsageError(str(error)) from error
-    from pytest_garl.plugin.startup import begin_run
+    from pytest_garl.plugin.session.startup import begin_run
 
     begin_run(config, options)

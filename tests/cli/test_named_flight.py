@@ -21,7 +21,7 @@ from pytest_garl.errors import GarlError, ScenarioError
 from pytest_garl.execution.reference import Reference
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import save
-from pytest_garl.plugin import case_tests
+from pytest_garl.plugin.items import case_tests
 from pytest_garl.scenarios.files import dumps
 from pytest_garl.shrinking.reshrink import CaseSetup
 from tests.cases.samples import LAWN

@@ -56,7 +56,7 @@ def test_what_flies_and_judges_no_case_does_not_matter(copy: Path, here: str) ->
         "npcs/learned.py",
         "execution/severity.py",
         "execution/worker.py",
-        "plugin/summary.py",
+        "plugin/terminal/summary.py",
         "shrinking/shrink.py",
         "scenarios/domains/field.toml",
         "search/breeder.py",

@@ -27,9 +27,9 @@ def searched_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.returncode == pytest.ExitCode.TESTS_FAILED, done.stdout
     assert "confirming and shrinking 2 new kinds of violation" in done.stdout
     assert "saved scenarios/regressions/systems/lawn-IV-dog-" in done.stdout
-    show = "The first of them that gates: garl cases show scenarios/regressions/systems/lawn-"
-    assert show in done.stdout
-    assert "as a film: garl film lawn-" in done.stdout
+    first = "first case that gates:\n    garl cases show scenarios/regressions/systems/lawn-"
+    assert first in done.stdout
+    assert "\n    garl film lawn-" in done.stdout
     assert "New cases that gate fail until they are fixed, committed, or accepted" in done.stdout
     add_cases_to_git(folder)
     return folder

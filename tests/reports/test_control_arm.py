@@ -10,7 +10,7 @@ import pytest
 from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger_queries import LedgerFlight
-from pytest_garl.plugin.summary import search_table
+from pytest_garl.plugin.terminal.summary import search_table
 from pytest_garl.reports.control_arm import LEAST_FLIGHTS, control_arm, is_control
 from pytest_garl.reports.run_markdown import _flights
 from pytest_garl.reports.run_reading import kinds_of

@@ -8,7 +8,7 @@ from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import FlightResult
-from pytest_garl.plugin.summary import headline_shares, legend, search_table, share_lines
+from pytest_garl.plugin.terminal.summary import headline_shares, legend, search_table, share_lines
 from pytest_garl.reports.run_reading import kinds_of
 from pytest_garl.reports.run_record import SearchRecord, Spread
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Finding, Limits

@@ -30,7 +30,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from pkgutil import iter_modules
+from pkgutil import walk_packages
 from types import ModuleType
 from typing import Any, ClassVar, Self
 
@@ -300,7 +300,7 @@ def import_all() -> None:
     with tempfile.TemporaryDirectory() as folder:
         config = _prepareconfig(["-s", "-c", os.devnull, "--rootdir", folder, folder])
         plugin = importlib.import_module("pytest_garl.plugin")
-        late = [f"{plugin.__name__}.{each.name}" for each in iter_modules(plugin.__path__)]
+        late = [each.name for each in walk_packages(plugin.__path__, f"{plugin.__name__}.")]
         for name in [*late, *IMPORTED_LATE]:
             importlib.import_module(name)
         config._ensure_unconfigure()

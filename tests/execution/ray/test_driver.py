@@ -181,7 +181,7 @@ def test_check_connects_only_to_an_address_with_a_port(monkeypatch: pytest.Monke
 def test_pytest_process_never_imports_ray() -> None:
     code = (
         "import sys\n"
-        "import pytest_garl.plugin.startup, pytest_garl.execution.ray.scheduler\n"
+        "import pytest_garl.plugin.session.startup, pytest_garl.execution.ray.scheduler\n"
         "import pytest_garl.execution.ray.driver\n"
         "print('ray' in sys.modules)\n"
     )
