@@ -21,6 +21,8 @@ they can see.  The arms are those of ``lab/arms.py``.
 - The first generation is the control of the search: chance, the same for all arms.  The measures
   stand twice: over all pairs, and over those that no arm found in the control, from its end on.
 - The placebo, a system without a fault, is searched for as well; it counts in no measure.
+- A fault and seed count if all arms have flown them.  While a seed is not whole, its faults are
+  flown in the order of ``random.Random(seed).shuffle``, so that those flown are a random part.
 - 400 flights for ``garl`` and ``exploring+`` on seeds 20 to 22: what the arm missed in 100 flights.
 
 **Judge 2, causes** (``causes.py``).  Three landing systems, searches of 400 flights, one map for

@@ -146,9 +146,9 @@ Found = Mapping[tuple[str, str, str], int]
 
 
 def report(rows: Sequence[Row]) -> str:
-    """Return the tables in Markdown; seeds that an arm has not flown wholly are left out."""
+    """Return the tables in Markdown, of the faults and seeds that all arms have flown."""
     all_ = [row for row in rows if row["flights"] == str(FLIGHTS)]
-    short, begun = whole_seeds([row for row in all_ if row["fault"] != PLACEBO.name])
+    short, left_out = flown_by_all_arms([row for row in all_ if row["fault"] != PLACEBO.name])
     if not short:
         return "nothing is flown"
     found: Found = {
@@ -162,18 +162,18 @@ def report(rows: Sequence[Row]) -> str:
         parts += [_ratios(found, lost, [arm for arm in arms if arm != OURS], control)]
     chance = [row for row in all_ if row["fault"] == PLACEBO.name]
     parts += [_longer(rows), _misses(lost, arms), _placebo(chance)]
-    if begun:
-        parts.append(f"Not counted, because not all faults are flown: {', '.join(begun)}.")
+    if left_out:
+        parts.append(f"Left out, because not all arms have flown them: {left_out} searches.")
     parts.append(f"Flown at {', '.join(sorted({row['commit'] for row in rows}))}.")
     return "\n\n".join(part for part in parts if part)
 
 
-def whole_seeds(rows: Sequence[Row]) -> tuple[list[Row], list[str]]:
-    """Return the rows of seeds of which an arm has flown all faults, and names of the others."""
-    flown = Counter((row["arm"], row["seed"]) for row in rows)
-    begun = {key for key, count in flown.items() if count < max(flown.values())}
-    names = [f"seed {seed} of {arm}" for arm, seed in sorted(begun)]
-    return [row for row in rows if (row["arm"], row["seed"]) not in begun], names
+def flown_by_all_arms(rows: Sequence[Row]) -> tuple[list[Row], int]:
+    """Return the rows of faults and seeds that all arms have flown, and the number of others."""
+    arms = len({row["arm"] for row in rows})
+    flown = Counter((row["fault"], row["seed"]) for row in rows)
+    kept = [row for row in rows if flown[row["fault"], row["seed"]] == arms]
+    return kept, len(rows) - len(kept)
 
 
 def _shares(found: Found, lost: set[Any], arms: Sequence[str], control: int) -> str:

@@ -201,10 +201,15 @@ def test_the_report_compares_all_pairs_and_those_after_the_control() -> None:
     assert faults.report([]) == "nothing is flown"
 
 
-def test_a_seed_that_is_not_wholly_flown_does_not_count() -> None:
-    text = faults.report(fault_rows("garl", {"gate": [25, 25], "mean": [None]}))
-    assert "| garl | 2 | " in text
-    assert "Not counted, because not all faults are flown: seed 21 of garl." in text
+def test_what_not_all_arms_have_flown_does_not_count() -> None:
+    rows = [
+        *fault_rows("garl", {"gate": [25, 25], "mean": [None]}),
+        *fault_rows("random", {"gate": [50]}),
+    ]
+    text = faults.report(rows)
+    assert "| garl | 1 | " in text
+    assert "| random | 1 | 0.50 [" in text
+    assert "Left out, because not all arms have flown them: 2 searches." in text
 
 
 def test_what_an_arm_missed_is_flown_for_longer() -> None:
