@@ -347,7 +347,7 @@ def shrink(project: _Project, file: Path, flights: int, workers: int, *, as_it_f
 )
 @click.pass_obj
 def renew(project: _Project, files: tuple[Path, ...], workers: int) -> None:
-    """Renew the hashes of cases that fail again to the byte.
+    """Renew hashes and words of cases that fail as before.
 
     It flies all cases, or FILEs, with today's sources. Do that after an upgrade, before you repair
     your landing system: only then does a later pass count as a repair. If the flight is the

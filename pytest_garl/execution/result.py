@@ -42,7 +42,8 @@ class FlightResult:
     ``outcome`` is that of the flight, or "inconclusive" if it came to no end.
     ``final_distance_m`` is horizontal, from the UAV to the marker's centre at the end;
     ``elapsed_s`` is the simulated time since the mission's start.  ``collisions`` are the names
-    of the bodies that the UAV hit.  ``undecided`` says why a property could not be judged.
+    of the bodies that the UAV hit.  ``undecided`` says why a property
+    could not be judged: the message of a crash, or why the flight is inconclusive.
     ``off_marker_m`` is the distance of a touchdown too far from the marker before the UAV gave up.
     ``closest_call`` is the signature that a near miss would have had, ``closest_body`` the body
     of that near miss; both are empty without one.  ``landed_s`` is the time of the touchdown of a

@@ -15,7 +15,8 @@ The modules, in the order in which a session needs them:
    asks for its ``landing``.  ``progress_display`` shows how far they are, in the words of
    ``progress_text``; ``kind_news`` tells each new kind of violation, and ``time_left`` forecasts
    the rest from what was flown.
-5. ``outcomes`` decides whether an item passes, fails, xfails or skips.  ``item_facts`` gathers the
+5. ``landing`` skips a test that reads what its flight did not decide.  ``outcomes`` decides whether
+   an item passes, fails, xfails or skips after that.  ``item_facts`` gathers the
    facts (with ``failed_statement`` and ``user_assertions``), and ``item_report`` writes the
    decision into the report (``report_text``).  What an item says travels as ``item_record``.
 6. ``tally`` counts what reports say, ``save_cases`` saves new violations, ``session_status`` sets

@@ -1,5 +1,8 @@
 """Decide the outcome of a landing item after its flight: pass, fail, xfail or skip, and why.
 
+A test that reads a property which its flight did not decide is skipped while it runs, by
+``landing.py``.  Here an item is skipped only if nothing can judge its flight.
+
 ``decide`` is a pure function from facts to a decision.  Some facts cost a flight or an entry in the
 ledger: as long as such a fact is None, ``decide`` returns a ``Need`` instead, and ``resolve`` asks
 for the fact.  ``item_report.py`` gathers the facts and applies the decision, ``report_text.py``
@@ -29,7 +32,7 @@ class Reason(Enum):
     TEST_ERROR = "the test raised something else than a failed assertion"
     INCONCLUSIVE = "the flight was not decided"
     CRASH = "no assertion can judge the flight: the system crashed or gave up"
-    REPORTED_ELSEWHERE = "another test of the slot reports the flight"
+    REPORTED_ELSEWHERE = "nothing can judge the flight, and another test of the slot says so"
     VIOLATION = "the search found a violation"
     EXPECTED = "a known case excuses it"
     DUPLICATE = "an item of an earlier slot reports the same violation"
