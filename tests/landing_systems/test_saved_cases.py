@@ -1,4 +1,4 @@
-"""The saved cases fly to the byte and are judged alike, whatever the words, in every Python that is supported."""
+"""The saved cases fly to the byte and are judged alike, in every Python that is supported."""
 
 from __future__ import annotations
 
