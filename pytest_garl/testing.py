@@ -132,18 +132,22 @@ class Check:
         return not self.faults and all(probe.passed for probe in self.probes)
 
     def __str__(self) -> str:
-        most_s = max(self.cpu_s, self.longest_cpu_s)
-        cost = (
-            f"this flight took {self.cpu_s:.1f} s of computing; a search of {FLIGHTS} flights on a "
-            f"map takes {FLIGHTS * self.cpu_s:.0f} s of it if all are like this one, and "
-            f"{FLIGHTS * most_s:.0f} s if all last the {self.longest_s:.0f} s that the limits "
-            "allow, as those that fail often do; to shrink what fails takes about as many "
-            "flights again; workers share all of it"
-        )
         found = [f"fault: {text}" for text in self.faults]
         found += [f"warning: {text}" for text in self.warnings]
-        lines = (self.task, *self.flights, cost, *self.probes)
+        fine = [probe.name for probe in self.probes if not probe.violated]
+        lines = [self.task, *self.flights, "" if self.faults else self._cost_text()]
+        lines += [f"probes {', '.join(fine)}: ok"] if fine else []
+        lines += [str(probe) for probe in self.probes if probe.violated]
         return "\n".join([f"{self.system}: {text}" for text in lines if text] + found)
+
+    def _cost_text(self) -> str:
+        """Return what a search costs, by the cheapest flights and by the longest ones."""
+        low_s = FLIGHTS * self.cpu_s
+        high_s = FLIGHTS * max(self.cpu_s, self.longest_cpu_s)
+        return (
+            f"a search of {FLIGHTS} flights on a map takes {low_s:.0f} to {high_s:.0f} s of "
+            "computing, which workers share, and about as much again to shrink what fails"
+        )
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -310,13 +314,15 @@ class _Checker:
             try:
                 first = self._fly(self._system, self._calm, self._seconds, keeps="")
                 result = judge.judge_flight(first.flight, self._plan.limits)
-                flights.append(f"{self._map.name}: {self._ending(first.flight, result)}")
+                flights.append(
+                    f"{self._map.name}: {self._ending(first.flight, result, self._seconds)}"
+                )
                 cpu_s = first.cpu_s
                 longest_cpu_s = cpu_s * self._longest_s / max(SHORTEST_S, first.flight.elapsed_s)
                 self._note_result(first, result)
-                other = self._compare(first)
+                other, seconds = self._compare(first)
                 drawn = judge.judge_flight(other.flight, self._plan.limits)
-                ending = self._ending(other.flight, drawn)
+                ending = self._ending(other.flight, drawn, seconds)
                 flights.append(f"{self._map.name}, another scenario: {ending}")
                 self._probe(judge, first.flight)
                 if {result.outcome, drawn.outcome} == {"gave_up"}:
@@ -340,10 +346,11 @@ class _Checker:
             longest_cpu_s=longest_cpu_s,
         )
 
-    def _ending(self, flight: Flight, result: FlightResult) -> str:
-        if not self._whole and flight.outcome == "not_landed":
+    def _ending(self, flight: Flight, result: FlightResult, seconds: float) -> str:
+        if seconds < self._longest_s and flight.outcome == "not_landed":
             place = _place(flight, flight.elapsed_s)
-            return f"cut off after {self._seconds:g} s (--seconds), {place}"
+            why = "--seconds" if seconds == self._plan.seconds else "so that the check ends in time"
+            return f"cut off after {seconds:.3g} s ({why}), {place}"
         return _landed(flight, result) or result.verdict.story
 
     def _task_text(self) -> str:
@@ -396,8 +403,11 @@ class _Checker:
         self._probed.append(result)
         return result, flight
 
-    def _compare(self, first: _TimedFlight) -> _TimedFlight:
-        """Fly both scenarios with fresh instances and with one that flies them all."""
+    def _compare(self, first: _TimedFlight) -> tuple[_TimedFlight, float]:
+        """Fly both scenarios with fresh instances and with one that flies them all.
+
+        Returns the flight of the second one, and the simulated time after which it was to end.
+        """
         seconds = self._seconds
         if 5 * first.cpu_s > self._limit_s:
             share = (self._limit_s - first.cpu_s) / (6 * first.cpu_s)
@@ -417,7 +427,7 @@ class _Checker:
                 self._check_equal(fresh.flight, again.flight, problem)
         finally:
             reused.close_instance()
-        return other
+        return other, seconds
 
     def _check_yaw(self, flight: Flight, yaws: list[tuple[float, float]]) -> None:
         """Refuse a heading of several turns, which radians rarely are."""

@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import itertools
 import math
+import re
 import subprocess
 import threading
 import time
@@ -259,11 +260,10 @@ def test_check_flies_until_landed_and_reports_the_distance() -> None:
     (warning,) = check.warnings
     assert warning.startswith("returns no diagnostics: reports cannot say what it saw or intended")
     assert all(f"{name}=" in warning for name in ("target_m", "detections", "phase"))
-    assert "ReferencePilot: this flight took" in str(check)
     # A flight until the time is up costs more than one that lands.
     assert check.longest_cpu_s > 3 * check.cpu_s
-    assert " if all last the 120 s that the limits allow" in str(check)
-    assert "a search of 40 flights on a map takes" in str(check)
+    low, high = re.findall(r"a search of 40 flights on a map takes (\d+) to (\d+) s", str(check))[0]
+    assert int(high) > 3 * int(low)
 
 
 def test_check_refuses_a_class_that_asks_for_the_truth() -> None:
@@ -415,8 +415,11 @@ def test_check_compares_a_slow_system_over_shorter_flights() -> None:
     plan = dataclasses.replace(testing.plan_for(map="lawn"), seconds=20.0, limit_s=10.0)
     calm = testing._Checker(Climbs, plan)
     first = calm._fly(Climbs, calm._calm, 20.0)
-    other = calm._compare(first._replace(cpu_s=5.0))
+    other, seconds = calm._compare(first._replace(cpu_s=5.0))
     assert 2.0 <= other.flight.elapsed_s < 5.0
+    unused: Any = None
+    ending = calm._ending(other.flight, unused, seconds)
+    assert ending.startswith(f"cut off after {seconds:.3g} s (so that the check ends in time), ")
 
 
 def test_check_ends_a_call_that_hangs(monkeypatch: pytest.MonkeyPatch) -> None:

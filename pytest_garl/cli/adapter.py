@@ -14,6 +14,8 @@ from pytest_garl import (
     Airframe,
     Camera,
     Command,
+    Detection,  # noqa: F401
+    Diagnostics,
     Land,
     Mission,
     Observation,
@@ -46,19 +48,25 @@ class {adapter}:
             return PositionSetpoint(position_m=there_m)
 
         image_bgr = observation.image[:, :, ::-1].copy()
-        altitude_m = float(observation.position_m[2])
-        # As a quaternion: pytest_garl.external.axes.turned_attitude, x, y, z, w of FRD in NED.
-        roll_rad, pitch_rad, heading_rad = euler_of(observation.attitude)  # of aviation
+        time_s, altitude_m = observation.time_s, float(observation.position_m[2])
+        # Of aviation. From the east it is math.pi / 2 - heading_rad. As a quaternion, x, y, z, w of
+        # FRD in NED: pytest_garl.external.axes.turned_attitude.
+        roll_rad, pitch_rad, heading_rad = euler_of(observation.attitude)
+        # turned() makes north, east, down of east, north, up, and back. observation.position_m and
+        # observation.velocity_mps are east, north, up.
         north_mps, east_mps, down_mps = turned(observation.velocity_mps)
         answer = self.stack.update(  # <-
             image_bgr, altitude_m, heading_rad, (north_mps, east_mps, down_mps)
         )
+        # What your stack saw, and where it takes the marker to be (east, north, up), such as
+        # detections=(Detection(marker_id=7, confidence=1.0, position_m=(x, y, 0.0)),).
+        seen = Diagnostics(detections=())  # <- without it no report can say what your stack saw
         if answer == "land":  # <-
-            return Land()
+            return Land(diagnostics=seen)
         if answer == "abort":  # <- it gives up
-            return Abort()
-        # Reports say what it saw if a command has diagnostics=Diagnostics(detections=...).
-        return VelocitySetpoint(velocity_mps=turned(answer), yaw_rad=None)  # <- north, east, down
+            return Abort(diagnostics=seen)
+        # North, east, down; without turned() east, north, up. yaw_rad=None keeps the heading.
+        return VelocitySetpoint(velocity_mps=turned(answer), yaw_rad=None, diagnostics=seen)  # <-
 '''
 
 

@@ -53,7 +53,7 @@ def check(
     no_probes: bool,
     nondeterministic: bool,
 ) -> None:
-    """Fly one cause at a time, in a minute; name faults.
+    """Fly clear air, then one cause at a time; name faults.
 
     Of a test file, such as test_my_landing.py, also with ::test_name, it takes landing system,
     marker, start, domain, limits and maps. A class, such as my_landing:MyLandingSystem, is flown

@@ -154,7 +154,7 @@ class Severity:
     def _conditions_text(self) -> str:
         acting = self.acting
         names, count = [name for name, _ in acting], len(acting)
-        place = " at this place of the marker" if self.placed else ""
+        place = " with the marker at this place" if self.placed else ""
         if not count:
             return f"nothing unusual{place and ' but the place of the marker'}"
         if count == 1:

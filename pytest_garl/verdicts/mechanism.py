@@ -243,7 +243,7 @@ def _report_text(evidence: Evidence) -> str:
     """Return a sentence about the last report of the marker by the system, if it reports any."""
     last = evidence.last_report_s(evidence.gave_up_s)
     if last is not None and evidence.reports_detections:
-        return f" The system last reported it at {last:.1f} s."
+        return f" The system last reported it in its place at {last:.1f} s."
     if last is not None:
         # A target may be a memory: it is no sighting.
         return f" Its place was the system's target up to {last:.1f} s."

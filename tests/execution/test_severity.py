@@ -158,8 +158,8 @@ def test_a_body_that_comes_while_the_marker_is_covered_says_so() -> None:
 @pytest.mark.parametrize(
     ("severity", "text"),
     [
-        (FOG, "fog at this place of the marker, visibility 11 m"),
-        (CAMERA, "2 conditions at this place of the marker: camera (dirt 15 %), person-1"),
+        (FOG, "fog with the marker at this place, visibility 11 m"),
+        (CAMERA, "2 conditions with the marker at this place: camera (dirt 15 %), person-1"),
         (
             Severity(about="conditions"),
             "nothing unusual but the place of the marker",

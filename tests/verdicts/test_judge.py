@@ -237,7 +237,7 @@ def test_reports_of_the_system_change_the_text_and_never_the_type() -> None:
     )
     verdicts = [judge(each, Limits()) for each in (silent, boasts, raves, remembers, mute)]
     assert {each.signature for each in verdicts} == {"II:gave-up-in-sight:approach"}
-    assert "The system last reported it at 29.0 s." in verdicts[1].story
+    assert "The system last reported it in its place at 29.0 s." in verdicts[1].story
     assert "The system reported other places" in verdicts[2].story
     assert "Its place was the system's target up to 29.0 s." in verdicts[3].story
     assert "The system reported no detection and no target." in verdicts[0].story
