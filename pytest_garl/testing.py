@@ -58,7 +58,7 @@ from pytest_garl.search.probes import (
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.ground_truth import PilotWrapper, is_own
 from pytest_garl.simulation.system_under_test.reading import finite
-from pytest_garl.verdicts.clear_air import place_beside_marker, seen_text, why_no_landing
+from pytest_garl.verdicts.clear_air import NEVER_OFF, place_beside_marker, seen_text, why_no_landing
 from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.verdict import Limits, default_distance_m
 
@@ -70,6 +70,7 @@ WHERE_TO_FLY = (
     "A program is told about where the marker is by {north_m} {east_m} or {lat_deg} {lon_deg} in "
     "the line that starts it."
 )
+TAKES_OVER = 'If the program takes over in the air, armed, state start="hover" in pytest.mark.garl.'
 SLOW_FLIGHT_S = 10.0
 """Computing time of one flight above which the check warns: a night has some 3,000 such flights."""
 SLOW_CALL_S = 3.0
@@ -459,6 +460,8 @@ class _Checker:
             why = why_no_landing(Evidence(flight, self._plan.limits), verdict)
             if isinstance(self._system, CompanionProgram) and self._saw_nothing(flight):
                 why += f" {WHERE_TO_FLY}"
+            if isinstance(self._system, CompanionProgram) and NEVER_OFF in why:
+                why += f" {TAKES_OVER}"
             self._faults.append(
                 f"your system does not land in clear air, on {self._map.name} without moving "
                 f"objects: {why} A search would report that again and again."

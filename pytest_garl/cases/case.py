@@ -263,7 +263,7 @@ class Case:
         """
         if self.evidence.removed == NOTHING:
             return "as the search found it, not shrunk"
-        return f"not shrunk; it lacks {self.removed} of the flight that was found"
+        return f"not shrunk; left out of the flight that was found: {self.removed}"
 
     @property
     def of_another_engine(self) -> str:

@@ -45,9 +45,9 @@ import math
 import pytest
 from pytest_garl import Camera, CompanionProgram, MarkerSpec
 
-# How the program is started, the Python in which it runs, and its camera. In the command may stand
-# what it is told: {{north_m}} {{east_m}} or {{lat_deg}} {{lon_deg}}, about where the marker is;
-# {{search_altitude_m}}, {{marker_id}}, {{marker_side_m}}.
+# How the program is started, and its camera. In the command may stand what it is told:
+# {{north_m}} {{east_m}} or {{lat_deg}} {{lon_deg}}, about where the marker is;
+# {{search_altitude_m}}, {{marker_id}}, {{marker_side_m}}. It runs in this Python, or in python="...".
 lander = CompanionProgram(
     {words},{python}  # <-
     camera=Camera(width_px=640, height_px=480, field_of_view_rad=math.radians(90)),  # <-
@@ -61,7 +61,10 @@ pytestmark = pytest.mark.garl(
     system={system},
     maps=["court", "lawn"],
     marker=MarkerSpec(dictionary="DICT_5X5_50", id=0, side_m=1.5),  # <-
-)
+{more})
+"""
+START = """\
+    start="ground",  # <- or "hover": the program takes over in the air, armed, in GUIDED
 """
 TESTS = """\
 
@@ -213,7 +216,9 @@ def _test_of(system: str, *, states_marker: bool) -> str:
     module, _, qualified = system.partition(":")
     imports = IMPORT_WITH_MARKER if states_marker else IMPORT
     head = imports.format(module=module, name=qualified.partition(".")[0])
-    return head + (WITH_MARKER if states_marker else MARKED).format(system=qualified) + TESTS
+    return (
+        head + (WITH_MARKER if states_marker else MARKED).format(system=qualified, more="") + TESTS
+    )
 
 
 def _test_of_program(line: str, here: Path, folder: Path) -> str:
@@ -223,7 +228,7 @@ def _test_of_program(line: str, here: Path, folder: Path) -> str:
         words += f',\n    folder="{Path(os.path.relpath(here, folder)).as_posix()}"'
     return (
         PROGRAM.format(words=words, python=_own_python(here))
-        + WITH_MARKER.format(system="lander")
+        + WITH_MARKER.format(system="lander", more=START)
         + TESTS
     )
 

@@ -13,6 +13,7 @@ from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.verdict import Verdict
 from pytest_garl.verdicts.wording import headline
 
+NEVER_OFF = "it never left the ground"
 STAY_M, STAY_S = 0.5, 5.0
 """A UAV that moved no farther from its last place in so long a time stayed there."""
 
@@ -41,7 +42,7 @@ def _last_stay(flight: Flight) -> str:
     """Return where a flight was in the end, and since when if it had stayed there."""
     track, end_s = flight.uav, flight.elapsed_s
     if feet_height_m(float(track.position_m[:, 2].max())) < STAY_M:
-        return "it never left the ground"
+        return NEVER_OFF
     moved = np.linalg.norm(track.position_m - track.position_m[-1], axis=1) > STAY_M
     since_s = float(track.time_s[np.nonzero(moved)[0][-1] + 1]) if moved.any() else 0.0
     if end_s - since_s < STAY_S:

@@ -113,7 +113,7 @@ def test_a_case_without_flights_says_what_it_lacks_of_the_flight_that_was_found(
     nothing = dataclasses.replace(case().evidence, removed="nothing")
     found = dataclasses.replace(case(), evidence=nothing)
     assert found.without_flights == "as the search found it, not shrunk"
-    lacks = "not shrunk; it lacks 3 of 4 objects of the flight that was found"
+    lacks = "not shrunk; left out of the flight that was found: 3 of 4 objects"
     assert case().without_flights == lacks
 
 

@@ -75,6 +75,7 @@ def test_a_script_gets_a_test_that_starts_it(folder: Path) -> None:
     assert """CompanionProgram(\n    "python 'my lander.py'",\n    folder="..",\n""" in written
     assert '    python="venv/bin/python",  # <-\n    camera=Camera(' in written
     assert "system=lander" in written
+    assert '    start="ground",  # <- or "hover": ' in written
     assert "test_completes_the_mission[court-g00-s00]" in collected(folder)
 
 
