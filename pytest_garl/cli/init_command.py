@@ -47,7 +47,7 @@ from pytest_garl import Camera, CompanionProgram, MarkerSpec
 
 # How the program is started, and its camera. In the command may stand what it is told:
 # {{north_m}} {{east_m}} or {{lat_deg}} {{lon_deg}}, about where the marker is;
-# {{search_altitude_m}}, {{marker_id}}, {{marker_side_m}}. It runs in this Python, or in python="...".
+# {{search_altitude_m}}, {{marker_id}}, {{marker_side_m}}. With python="..." it runs in another one.
 lander = CompanionProgram(
     {words},{python}  # <-
     camera=Camera(width_px=640, height_px=480, field_of_view_rad=math.radians(90)),  # <-
