@@ -54,9 +54,9 @@ layers: $(READY)
 	$(BIN)/lint-imports
 
 # The saved cases come last: the pool that flies them lives to the end, and tests of processes count children.
-# Four processes on two cores: many a test waits for a hang, for a clock or for another process.
+# Three processes on two cores: many a test waits for a hang, for a clock or for another process.
 tests: $(COMPILED)
-	$(BIN)/pytest -n 4 --dist=worksteal -m "not ray and not long" --durations=15 tests landing_systems
+	$(BIN)/pytest -n 3 --dist=worksteal -m "not ray and not long" --durations=15 tests landing_systems
 
 # PyTorch, which only training needs, is not installed there: its tests skip.
 test-others:  ## the fast tests and the saved cases on every other supported Python that is installed

@@ -17,7 +17,9 @@ NOT_HASHED = (
     "messages.py",
     "plugin",
     "reports",
+    "shrinking",
     "testing.py",
+    "triage",
 )
 """Folders and modules of the package that start searches or show their results."""
 
@@ -38,7 +40,7 @@ def test_the_hash_changes_with_the_files_that_shape_a_search_alone(
     assert re.fullmatch("[0-9a-f]{64}", here)
     monkeypatch.setattr(reference, "__file__", str(copy / "execution" / "reference.py"))
     assert fresh() == here
-    (copy / "plugin" / "summary.py").write_text("")
+    (copy / "plugin" / "terminal" / "summary.py").write_text("")
     (copy / "verdicts" / "notes.txt").write_text("")
     assert fresh() == here
     (copy / "scenarios" / "maps" / "court.toml").write_text("")
