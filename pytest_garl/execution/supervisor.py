@@ -2,9 +2,29 @@
 
 A worker is two processes.  The flying process runs the landing system's code, which may hold the
 interpreter for ever, close files, replace ``time.time`` or be killed.  The supervisor never runs a
-line of that code: it forks the flying process, shares one page of memory with it, ends it if it
-hangs, has each flight judged from its record, and ends all processes that the landing system
-leaves behind.
+line of that code.  A flight, in steps:
+
+1. The supervisor forks the flying process, with one page of memory that both see and a pipe for its
+   stderr.  Forks are used because a start takes a second, and flights take three.
+2. Before each call of the landing system the flying process notes the time in that page, and a zero
+   after it (:class:`FlightMonitor`).  That costs less than a microsecond and no system call, since
+   the flight control calls 240 times a second.
+3. The supervisor looks at the page each time it waits for stderr, twenty times a second.  If a
+   call takes too long it asks for the stacks by a signal, waits for them a moment, and kills the
+   process: no thread of the interpreter could do that.
+4. The flying process writes the flight's record and asks for a verdict.  The supervisor reads the
+   record and judges it here, where nothing has replaced ``math.hypot``.
+5. It ends what the landing system has left behind: children, and children of children that left
+   their session.  If there was something, the next flight gets a fresh process.
+6. It shows four times a second that it goes on, since a landing system may stop it by a signal; the
+   pool ends both if it does not.
+
+The order is that of what can still be known: stacks before the kill, the end of stderr before the
+process is forgotten, the verdict before the worker takes the next slot.
+
+An example: a call waits for a lock for ever, with a limit of 10 s.  At 10 s the supervisor takes
+the stacks, which name file and line, and kills the process.  The flight is repeated alone with
+three times the limit; if it hangs again, that is a finding of type V with these stacks.
 """
 
 from __future__ import annotations

@@ -1,4 +1,32 @@
-"""The downward camera: a compositor that gives colour, depth and segmentation."""
+"""The downward camera: a compositor that gives colour, depth and segmentation.
+
+A picture has one plane, the ground, and a few boxes and bodies above it, so it is composed in
+place of traced, with OpenCV on one thread: the same bytes on every CPU of a class, in milliseconds.
+A frame has two parts:
+
+1. *At once*, since the system under test or a property may need it: the depth of each pixel from
+   the plane (``projection.py``), the marker's outline in the segmentation, and the solids, drawn
+   into both (``solids.py``).
+2. *When it is asked for*, since no system looks at every picture: the colour, and how well the
+   marker can be seen (``marker_sight.py``).  Both read the scene of their frame, whatever was drawn
+   since.
+
+The colour, in the order in which light goes:
+
+3. The ground, painted once for each scenario at two scales, the wide one and a fine inset about the
+   marker, and warped into the picture from the level whose pixels are as large as the picture's
+   (``ground.py``).
+4. Shadows and gloss on it, the sky, then the solids that stand before it.
+5. Particles of rain, snow, dust and leaves, each before or behind what lies in its place.
+6. Fog, by the path of the light through the air.
+7. The camera: movement while it is exposed, the lens's distortion, dirt on the lens, then the
+   sensor's gain, noise and colour (``exposure.py``, ``lens.py``, ``image_sensor.py``).
+
+A lens bends what a pinhole saw, so all before step 7 is a pinhole's, and the depth and segmentation
+are bent with it.  An example: the shadow of a tree falls on the marker in fog.  Step 1 gives the
+marker's pixels, step 4 darkens a part of them, step 6 takes contrast from all, and ``marker_sight``
+gives the same two losses as numbers, from which verdicts say whether somebody could have read it.
+"""
 
 from __future__ import annotations
 
