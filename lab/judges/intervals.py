@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,8 +25,10 @@ class Estimate:
     high: float
 
     def text(self, digits: int = 2, scale: float = 1.0) -> str:
-        """Return such as ``0.71 [0.60, 0.82]``."""
+        """Return such as ``0.71 [0.60, 0.82]``; a mean of one value has no interval."""
         value, low, high = (scale * each for each in (self.value, self.low, self.high))
+        if math.isinf(low):
+            return f"{value:.{digits}f}"
         return f"{value:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
