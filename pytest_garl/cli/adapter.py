@@ -14,7 +14,7 @@ from pytest_garl import (
     Airframe,
     Camera,
     Command,
-    Detection,  # noqa: F401
+    Detection,
     Diagnostics,
     Land,
     Mission,
@@ -58,9 +58,10 @@ class {adapter}:
         answer = self.stack.update(  # <-
             image_bgr, altitude_m, heading_rad, (north_mps, east_mps, down_mps)
         )
-        # What your stack saw, and where it takes the marker to be (east, north, up), such as
-        # detections=(Detection(marker_id=7, confidence=1.0, position_m=(x, y, 0.0)),).
-        seen = Diagnostics(detections=())  # <- without it no report can say what your stack saw
+        # What your stack saw, at the place where it takes the marker to be (east, north, up), such
+        # as (Detection(marker_id=7, confidence=1.0, position_m=(x, y, 0.0)),). Reports show it.
+        detections: tuple[Detection, ...] = ()  # <-
+        seen = Diagnostics(detections=detections)
         if answer == "land":  # <-
             return Land(diagnostics=seen)
         if answer == "abort":  # <- it gives up

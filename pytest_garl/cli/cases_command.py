@@ -41,7 +41,7 @@ NO_PROOF = 3
 """Exit status of a replay that proves nothing."""
 EXIT_STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
 MINIMUM_RESHRINK_FLIGHTS = 9
-"""``reshrink.MINIMUM_RESHRINK_FLIGHTS``, whose module takes long to import."""
+"""``shrinking.plan.LEAST_OF_SAVED``, whose module takes long to import."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
