@@ -37,7 +37,6 @@ KEPT_APART = {
     "npcs/training/rewards": "formulae, named by their module where they are used",
     "plugin/terminal/github_summary": "what only GitHub gets, outside of which it is not loaded",
     "plugin/hookspecs": "pluggy reads a module",
-    "plugin/option_values": "reads texts; options says which option is which",
     "plugin/terminal/pages": "a run without pages does not load it",
     "reports/film/gif": "a format of files",
     "reports/film/labels": "letters for any picture",

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import re
+import urllib.parse
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import pytest
 
@@ -15,14 +16,6 @@ from pytest_garl.files.run_files import ARCHIVE, CASES_FOLDER, REPEAT_LEDGER, SE
 from pytest_garl.npcs.domain_policy import domain_with_policy, policy_in
 from pytest_garl.npcs.policy_catalogue import policy_names
 from pytest_garl.plugin.arguments import OPTIONS, Option
-from pytest_garl.plugin.option_values import (
-    among,
-    filmed,
-    integer,
-    number,
-    report_url,
-    wrong,
-)
 from pytest_garl.plugin.xdist import CONTROLLER, SEED, is_xdist_worker
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.search.method_catalogue import default_policy, find_method, method_names
@@ -30,6 +23,8 @@ from pytest_garl.search.method_catalogue import default_policy, find_method, met
 if TYPE_CHECKING:
     from pytest_garl.scenarios.domains.domain import Domain
 
+_URL = re.compile(r"[\w.~:/?#@!$&*+,;=%-]+", re.ASCII)
+"""An address without what ends it in Markdown or HTML."""
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
 LARGEST_POPULATION = 20
 SMALLEST_POPULATION = 8
@@ -148,8 +143,8 @@ def read_options(config: pytest.Config) -> Options:
     """Read the options; call ``options_of``, which does it once."""
     text = {option.name: _value(config, option) for option in OPTIONS}
     of_controller = getattr(config, "workerinput", {})
-    budget = integer("budget", text["budget"], 1) if text["budget"] else 0
-    size = integer("population", text["population"], 1) if text["population"] else 0
+    budget = _integer("budget", text["budget"], 1) if text["budget"] else 0
+    size = _integer("population", text["population"], 1) if text["population"] else 0
     address = os.environ.get("RAY_ADDRESS", "")
     address = "" if address == "local" else address
     folder = config.rootpath / str(config.getini("garl_dir"))
@@ -165,15 +160,17 @@ def read_options(config: pytest.Config) -> Options:
         pool=pool,
         workers=_workers(text["workers"], pool, address),
         ray_address=address,
-        timeout_s=number("--garl-timeout", text["timeout"], 1e6, "a positive number of seconds"),
+        timeout_s=_number("--garl-timeout", text["timeout"], 1e6, "a positive number of seconds"),
         repeat=_repeat(text["repeat"]),
         duplicates=_word(config, "garl_duplicates", ("xfail", "fail")),
         npcs=_npcs(text["npcs"]),
         baseline=_baseline(config),
-        level=number("garl_level", str(config.getini("garl_level")), 1, "a number between 0 and 1"),
+        level=_number(
+            "garl_level", str(config.getini("garl_level")), 1, "a number between 0 and 1"
+        ),
         report=_report(config),
-        report_url=report_url(str(config.getini("garl_report-url"))),
-        film=filmed(text["film"], draws=not is_xdist_worker(config)),
+        report_url=_report_url(str(config.getini("garl_report-url"))),
+        film=_filmed(text["film"], draws=not is_xdist_worker(config)),
         shrink=_shrink(text["shrink"]),
         shrink_capped=not text["shrink"],
         xfail_strict=bool(config.getini("garl_xfail_strict")),
@@ -210,16 +207,16 @@ def _given(config: pytest.Config) -> frozenset[str]:
 def _workers(text: str, pool: str, ray_address: str) -> int | None:
     if text:
         # None of Ray's workers is the pytest process.
-        return integer("workers", text, 1 if pool == "ray" else 0)
+        return _integer("workers", text, 1 if pool == "ray" else 0)
     return None if pool == "ray" and ray_address else os.cpu_count() or 1
 
 
 def _shrink(text: str) -> int:
     if not text:
         return SHRINK
-    number = integer("shrink", text, 0)
+    number = _integer("shrink", text, 0)
     if 0 < number < MINIMUM_SHRINK:
-        raise wrong("shrink", text, f"0, or at least {MINIMUM_SHRINK} flights per new kind")
+        raise _wrong("shrink", text, f"0, or at least {MINIMUM_SHRINK} flights per new kind")
     return number
 
 
@@ -241,7 +238,7 @@ def _place(config: pytest.Config, name: str) -> tuple[str, Path]:
 def _baseline(config: pytest.Config) -> Path | None:
     text, folder = _place(config, "baseline")
     if text and not (folder / text).is_file():
-        raise wrong("baseline", text, "a file that `garl baseline save` wrote")
+        raise _wrong("baseline", text, "a file that `garl baseline save` wrote")
     return folder / text if text else None
 
 
@@ -257,7 +254,7 @@ def _report(config: pytest.Config) -> Path | None:
 
 def _method(text: str) -> str:
     if ":" not in text:
-        return among("method", text, method_names())
+        return _among("method", text, method_names())
     try:
         find_method(text)
     except GarlError as error:
@@ -279,7 +276,7 @@ def _npcs(text: str) -> str:
         return text
     if not text.endswith(".npz"):
         expected = f"one of {', '.join(policy_names())}, or weights (.npz) that `garl train` wrote"
-        raise wrong("npcs", text, expected)
+        raise _wrong("npcs", text, expected)
     return text
 
 
@@ -288,10 +285,71 @@ def _seed(text: str) -> int:
         import secrets
 
         return secrets.randbelow(2**32)
-    return integer("seed", text, 0)
+    return _integer("seed", text, 0)
 
 
 def _repeat(text: str) -> str:
     if text and not SLOT_ID.fullmatch(text) and not Path(text).is_file():
-        raise wrong("repeat", text, "a slot such as court-g03-s17, or an existing scenario file")
+        raise _wrong("repeat", text, "a slot such as court-g03-s17, or an existing scenario file")
     return text
+
+
+def _wrong(name: str, found: str, expected: str) -> pytest.UsageError:
+    """Return the error of an option with a value that it cannot have."""
+    return _refused(f"--garl-{name}", found, expected)
+
+
+def _refused(where: str, found: str, expected: str) -> pytest.UsageError:
+    """Return the error of an option or an ini key with a value that it cannot have."""
+    return pytest.UsageError(f"{where}: found {found!r}, expected {expected}")
+
+
+def _integer(name: str, text: str, low: int) -> int:
+    """Return a whole number of at least ``low``."""
+    if not re.fullmatch(r"\d+", text) or int(text) < low:
+        raise _wrong(name, text, f"a whole number of at least {low}")
+    return int(text)
+
+
+def _number(where: str, text: str, below: float, expected: str) -> float:
+    """Return a number between 0 and ``below``, both excluded, for an option or key ``where``."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < below:
+        raise _refused(where, text, expected)
+    return value
+
+
+def _among(name: str, text: str, known: tuple[str, ...]) -> str:
+    """Return one of the known words."""
+    if text not in known:
+        raise _wrong(name, text, f"one of {', '.join(known)}")
+    return text
+
+
+def _filmed(text: str, *, draws: bool) -> Literal["", "failures"]:
+    """Return which flights have films; a process that ``draws`` needs an encoder.
+
+    It is looked for at once: a search of hours shall not end without its films.
+    """
+    if not text:
+        return ""
+    _among("film", text, ("failures",))
+    if draws:
+        from pytest_garl.reports.film.encoder import find_ffmpeg
+
+        try:
+            find_ffmpeg()
+        except GarlError as error:
+            raise pytest.UsageError(f"--garl-film={text}: {error}") from error
+    return cast(Literal["failures"], text)
+
+
+def _report_url(text: str) -> str:
+    """Return the address without a slash at its end."""
+    parts = urllib.parse.urlsplit(text)
+    if text and not (parts.scheme in ("http", "https") and parts.netloc and _URL.fullmatch(text)):
+        raise _refused("garl_report-url", text, "an address such as https://example.org/report")
+    return text.rstrip("/")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import pytest
@@ -16,7 +16,6 @@ from pytest_garl.plugin.items.keys import COLLECTED, REPEATED, SLOT_FIXTURE, mar
 from pytest_garl.plugin.items.marker import MarkerArguments, read_marker
 from pytest_garl.plugin.items.target import Target
 from pytest_garl.plugin.options import Options, options_of
-from pytest_garl.scenarios.maps.loading import map_names
 
 _CORPUS = pytest.StashKey[Corpus]()
 NOTHING_TO_FLY = (
@@ -100,10 +99,9 @@ def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark) -> None:
         reason = f"--garl-repeat={options.repeat}: this test does not fly it"
     else:
         entries = corpus_of(config, options).entries(arguments.target.system_name)
-        known_maps = map_names(options.map_folders)
         searched = slots(options.budget, options.population)
         targets = [
-            *_saved_targets(entries, arguments, known_maps, test.originalname),
+            *_saved_targets(entries, arguments, test.originalname),
             *(replace(each, slot=slot) for each in arguments.targets.values() for slot in searched),
         ]
         reason = "no map selected" if options.budget else NOTHING_TO_FLY
@@ -112,10 +110,7 @@ def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark) -> None:
 
 
 def _saved_targets(
-    entries: Iterable[CorpusEntry],
-    arguments: MarkerArguments,
-    known_maps: Collection[str],
-    test: str,
+    entries: Iterable[CorpusEntry], arguments: MarkerArguments, test: str
 ) -> Iterator[Target]:
     """Yield what a test called ``test`` flies of its system's saved cases.
 
@@ -124,7 +119,7 @@ def _saved_targets(
     """
     for entry in entries:
         header = entry.header
-        if header is None or header.map not in known_maps:
+        if header is None or header.map not in arguments.known_maps:
             yield replace(arguments.target, entry=entry)
         elif header.map in arguments.targets and header.asserting_test in ("", test):
             target = replace(arguments.targets[header.map], entry=entry)

@@ -35,6 +35,8 @@ class MarkerArguments:
 
     maps: tuple[str, ...]
     """All maps that the marker names."""
+    known_maps: tuple[str, ...]
+    """All maps that there are."""
     target: Target
     """A target without map, for items that have none."""
     targets: Mapping[str, Target]
@@ -61,8 +63,9 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     domain = _domain(given.get("domain"), options)
     check_system(given["system"])
     data_files(files, options.root)  # Raises if one of them does not exist.
+    known = map_names(options.map_folders)
     if not names:
-        there = ", ".join(map_names(options.map_folders))
+        there = ", ".join(known)
         raise GarlError(f"mark.garl: maps=[]: nothing to fly on; expected one or more of {there}")
     maps = [load_map(name, options.map_folders) for name in names]
     target = Target(
@@ -86,7 +89,7 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
                 limits=Limits(**asdict(bounds)),
                 task=Task(marker=own, start=start),
             )
-    return MarkerArguments(maps=names, target=target, targets=targets)
+    return MarkerArguments(maps=names, known_maps=known, target=target, targets=targets)
 
 
 def _map_names(given: Mapping[str, Any]) -> tuple[str, ...]:

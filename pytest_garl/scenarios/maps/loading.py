@@ -58,7 +58,8 @@ def load_map(name: str, search_path: Sequence[Path] = ()) -> Map:
     for folder in _folders(search_path):
         file = folder / f"{name}.toml"
         if file in _maps_in(folder):
-            return _read(file, _modified_ns(file))
+            modified_ns = _modified_ns(file)
+            return _read(file, modified_ns)
     raise ScenarioError(
         f"unknown map {shown(name)}; expected one of {listed(map_names(search_path))}. "
         "A map of your own is a file scenarios/maps/<name>.toml"
