@@ -80,6 +80,11 @@ def pytest_configure(config: pytest.Config) -> None:
         "flights may differ (default: True); files are its data files, which --garl-resume "
         "compares.",
     )
+    config.addinivalue_line(
+        "markers",
+        "garl_gates_nothing: given to the items of saved cases with gates = false; "
+        "-m 'not garl_gates_nothing' leaves them out.",
+    )
     check_keys(config)
     if config.getini("garl_engine"):
         from pytest_garl import engine

@@ -34,6 +34,19 @@ def test_case_on_an_edge_excuses_no_violation_of_a_search(searched: pytest.Pytes
     assert load_case(fog).gates
 
 
+def test_cases_that_gate_nothing_can_be_left_out_by_their_mark(searched: pytest.Pytester) -> None:
+    fog = _fog(searched)
+    replace_file(fog, dataclasses.replace(load_case(fog), reason="edge"))
+    listed = ("--collect-only", "-q", "-k", "lawn-I-nothing")
+    chosen = run(searched, *listed, "-m", "garl_gates_nothing")
+    others = run(searched, "--collect-only", "-q", "-m", "not garl_gates_nothing")
+    assert "case-lawn-I-nothing" in chosen.stdout.str()
+    assert "case-lawn-I-nothing" not in others.stdout.str()
+    assert "case-" in others.stdout.str()
+    result = run(searched, "--garl-workers=0", "-m", "not garl_gates_nothing", "-k", "test_time")
+    assert result.ret == pytest.ExitCode.OK
+
+
 def test_known_case_is_red_in_no_session_whose_tests_do_not_assert_it(
     searched: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:

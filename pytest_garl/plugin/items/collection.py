@@ -105,8 +105,15 @@ def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark) -> None:
             *(replace(each, slot=slot) for each in arguments.targets.values() for slot in searched),
         ]
         reason = "no map selected" if options.budget else NOTHING_TO_FLY
-    ids = [target.name for target in targets]
-    metafunc.parametrize(SLOT_FIXTURE, targets or [reason], ids=ids or ["nothing"], indirect=True)
+    items = [pytest.param(each, id=each.name, marks=_marks(each)) for each in targets]
+    nothing = [pytest.param(reason, id="nothing")]
+    metafunc.parametrize(SLOT_FIXTURE, items or nothing, indirect=True)
+
+
+def _marks(target: Target) -> tuple[pytest.MarkDecorator, ...]:
+    """Return the mark by which ``-m`` selects cases that fail no run."""
+    header = target.entry.header if target.entry else None
+    return (pytest.mark.garl_gates_nothing,) if header is not None and header.reason else ()
 
 
 def _saved_targets(
