@@ -76,8 +76,8 @@ class RunProgress:
     def phrases(self) -> list[str]:
         """The parts of the line, the most important first."""
         # Each new kind adds flights to shrink it, so that one total of all would jump.
-        purpose = "to shrink" if self.shrinks else "to repeat"
-        after = f", {self.flown_after:.0f}/~{self._after:.0f} {purpose}" if self._after else ""
+        purpose = "shrinking" if self.shrinks else "repeating"
+        after = f", {purpose} {self.flown_after:.0f}/~{self._after:.0f}" if self._after else ""
         phrases = [f"{self._searched}/{self._wanted} flights{after}"]
         if self.left_s is not None:
             phrases.append(f"{duration(self.left_s)} left")

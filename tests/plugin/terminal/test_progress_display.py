@@ -152,7 +152,7 @@ def test_progress_line_shows_shrinking_and_disappears(pytester: pytest.Pytester)
     written = on_a_terminal(pytester, *search, "-q")
     assert "garl: confirming and shrinking" in written
     # The forecast leaves no room for more on so narrow a terminal.
-    assert re.search(r"garl \[#+-*\]  \d+/\d+ flights, \d+/~\d+ to shrink  \d+ s left", written)
+    assert re.search(r"garl \[#+-*\]  \d+/\d+ flights, shrinking \d+/~\d+  \d+ s left", written)
     after = "\n".join(screen(written))
     assert "saved scenarios/regressions/slow/lawn-" in after.replace("\n", "")
     assert not LINE.search(after)

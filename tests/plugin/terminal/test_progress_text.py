@@ -34,11 +34,11 @@ PROGRESS = RunProgress(
 
 def test_line_tells_the_flights_that_shrink_from_those_of_the_search() -> None:
     assert progress_line(PROGRESS, 160) == (
-        "garl [#####---------------]  4/8 flights, 0/~8 to shrink  24 s left  I:2 IV:1  "
+        "garl [#####---------------]  4/8 flights, shrinking 0/~8  24 s left  I:2 IV:1  "
         "A on court g01 3/4  0.50 flights/s  nearest collision 0.25 m, time 90 s"
     )
     more = dataclasses.replace(PROGRESS, selected=40)
-    assert "4/40 flights, 0/~8 to shrink" in progress_line(more, 160)
+    assert "4/40 flights, shrinking 0/~8" in progress_line(more, 160)
     new = RunProgress(searches=TWO[1:], kinds={}, nearest={})
     assert progress_line(new, 160) == "garl [#####---------------]  1/4 flights  A on lawn g00 1/4"
 
@@ -180,11 +180,11 @@ def test_line_says_that_kinds_are_shrunk_beside_the_search() -> None:
 def test_line_of_a_run_that_does_not_shrink_speaks_of_repeating_only() -> None:
     repeating = dataclasses.replace(PROGRESS, shrinks=False, flown_after=3.0, expected_after=4.0)
     line = progress_line(repeating, 200)
-    assert "4/8 flights, 3/~4 to repeat" in line
+    assert "4/8 flights, repeating 3/~4" in line
     done = SearchProgress(search="s", system="m:A", map="court", flown=8, total=8, generation=1)
     ended = dataclasses.replace(repeating, searches=[done], left_s=3.0, after_search=True)
     assert progress_line(ended, 200).startswith(
-        "garl [##################--]  8/8 flights, 3/~4 to repeat  3 s left  I:2 IV:1  repeating  "
+        "garl [##################--]  8/8 flights, repeating 3/~4  3 s left  I:2 IV:1  repeating  "
     )
 
 
@@ -194,7 +194,7 @@ def test_narrow_terminal_gets_whole_phrases(width: int) -> None:
     assert len(line) <= max(width, len("garl [##--------]"))
     assert {*line.split("  ")[1:]} <= {*PROGRESS.phrases}
     if width >= 80:
-        assert "garl [##--------]  4/8 flights, 0/~8 to shrink  24 s left" in line or width >= 100
+        assert "garl [##--------]  4/8 flights, shrinking 0/~8  24 s left" in line or width >= 100
 
 
 def test_line_follows_the_forecast_once_there_is_one() -> None:
@@ -209,5 +209,5 @@ def test_line_follows_the_forecast_once_there_is_one() -> None:
         after_search=True,
     )
     assert progress_line(shrinking, 99) == (
-        "garl [###-------]  4/4 flights, 2/~12 to shrink  33 s left  IV:3  confirming and shrinking"
+        "garl [###-------]  4/4 flights, shrinking 2/~12  33 s left  IV:3  confirming and shrinking"
     )
