@@ -17,6 +17,7 @@ from lab.experiment.spec import Experiment, ExperimentRun
 from pytest_garl.errors import ExperimentError, GarlError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.files.atomic import locked
+from pytest_garl.npcs.domain_policy import domain_with_policy
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.method_catalogue import find_method
@@ -39,7 +40,7 @@ def missing_runs(experiment: Experiment, known: Sequence[ResultRow]) -> tuple[Ex
         maps = tuple(
             map
             for map in run.maps
-            if (run.system, map, run.method, run.seed, run.budget) not in keys
+            if (run.system, map, run.method, run.seed, run.budget, run.domain) not in keys
         )
         if maps:
             found.append(dataclasses.replace(run, maps=maps))
@@ -59,6 +60,7 @@ def check_experiment(experiment: Experiment, root: Path) -> None:
             ("maps", run.maps, functools.partial(load_map, search_path=(_maps(root),))),
             ("methods", (run.search_method,), _known_method),
             ("methods", (run.npcs,) if run.npcs else (), policy_spec),
+            ("domain", (run.domain,), functools.partial(domain_with_policy, folder=root)),
         ):
             for each in what:
                 _found(experiment, key, each, find)

@@ -91,6 +91,8 @@ def result_row(
         method=run.method,
         seed=run.seed,
         budget=run.budget,
+        domain=run.domain,
+        engine=search.job.engine,
         workers=workers,
         machine=cpu_class_of_flights(),
         result_hash=ledger.queries.result_hash(search.key)[:HASH_DIGITS],

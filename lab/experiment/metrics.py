@@ -99,7 +99,12 @@ def searches_in_grid(
 ) -> list[MethodSearches]:
     """Return the searches of each map, system and method of a grid, also of those without rows."""
     wanted = sorted(
-        (row for row in rows if row.seed in grid.seeds and row.budget == experiment.budget),
+        (
+            row
+            for row in rows
+            if (row.budget, row.domain) == (experiment.budget, grid.domain)
+            and row.seed in grid.seeds
+        ),
         key=lambda row: row.seed,
     )
     return [

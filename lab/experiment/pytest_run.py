@@ -58,7 +58,7 @@ def _command(run: ExperimentRun, folder: Path, workers: int) -> list[str]:
         f"--garl-seed={run.seed}",
         f"--garl-map={','.join(run.maps)}",
         f"--garl-workers={workers}",
-        "--garl-domain=paper",
+        f"--garl-domain={run.domain}",
         "--garl-shrink=0",
         "-o",
         f"garl_dir={folder.resolve()}",

@@ -84,7 +84,7 @@ def _flown(experiment: Experiment, rows: Sequence[ResultRow]) -> Iterator[str]:
         lines.append(
             f"- {grid.name}: {flown} of {wanted} searches of {experiment.budget} flights: "
             f"{', '.join(grid.systems)} on {', '.join(grid.maps)} by {', '.join(grid.methods)}; "
-            f"seeds {seeds}"
+            f"seeds {seeds}; domain {grid.domain}"
         )
     yield "\n".join(lines)
     left = missing_runs(experiment, rows)
@@ -109,7 +109,7 @@ def _identity(rows: Iterable[ResultRow]) -> Iterator[str]:
     """Yield the code, machines and settings of the rows, so that a mixture is visible."""
     facts = [
         Counter(f"pytest-garl {row.version}, sources {row.package_sha256}" for row in rows),
-        Counter(f"{row.machine}, {row.workers} workers" for row in rows),
+        Counter(f"{row.machine}, {row.engine}, {row.workers} workers" for row in rows),
         Counter(
             f"{row.system}: `{row.landing_system}`, sources {row.landing_system_sha256}"
             for row in rows

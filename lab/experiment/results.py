@@ -59,6 +59,8 @@ class ResultRow:
     policy_sha256: str
     version: str
     package_sha256: str
+    domain: str
+    engine: str
     machine: str
     result_hash: str
     limits: str
@@ -71,9 +73,9 @@ class ResultRow:
     kind_counts: tuple[int, ...]
 
     @property
-    def key(self) -> tuple[str, str, str, int, int]:
-        """The identity of a search: system, map, method, seed, budget."""
-        return self.system, self.map, self.method, self.seed, self.budget
+    def key(self) -> tuple[str, str, str, int, int, str]:
+        """The identity of a search: system, map, method, seed, budget, domain."""
+        return self.system, self.map, self.method, self.seed, self.budget, self.domain
 
     @property
     def causes(self) -> tuple[str, ...]:

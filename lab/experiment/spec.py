@@ -20,8 +20,12 @@ _MOST_FLIGHTS = 1_000_000
 """Largest budget of a search: more than a year of flying."""
 WITH = " with "
 """Separates a search method and an NPC policy."""
+PAPER = "paper"
+"""The domain of experiments that name none: the world of the paper."""
 PAPER_TYPES = ("I", "II", "III", "IV", "V")
-TOP_KEYS = frozenset({"title", "text", "report", "budget", "seeds", "maps", "systems", "grids"})
+TOP_KEYS = frozenset(
+    {"title", "text", "report", "budget", "domain", "seeds", "maps", "systems", "grids"}
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,10 +34,12 @@ class ExperimentRun:
 
     ``system`` is the name in tables and rows, ``tests`` the argument of pytest.  ``method`` is a
     search method, or "method with policy" if another NPC policy replaces the method's own.
+    ``domain`` is a name or a TOML file, as ``--garl-domain`` takes it.
     """
 
     system: str
     tests: str
+    domain: str
     maps: tuple[str, ...]
     method: str
     seed: int
@@ -53,19 +59,22 @@ class ExperimentRun:
     def title(self) -> str:
         """The run in one line."""
         where = " and ".join(self.maps)
-        return f"{self.system}, {self.method}, seed {self.seed}, {self.budget} flights on {where}"
+        return (
+            f"{self.system}, {self.method}, seed {self.seed}, {self.budget} flights on {where}, "
+            f"domain {self.domain}"
+        )
 
     @property
     def folder(self) -> str:
         """The name of the folder of its ledger; different runs have different names."""
         words = (self.system, self.method, f"seed{self.seed}", str(self.budget), *self.maps)
-        digest = hashlib.sha256(repr((self.tests, *words)).encode()).hexdigest()[:6]
+        digest = hashlib.sha256(repr((self.tests, self.domain, *words)).encode()).hexdigest()[:6]
         return re.sub(r"[^A-Za-z0-9]+", "-", "-".join((*words, digest)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """A section of the report with its own tables: systems × maps × methods × seeds.
+    """A section of the report with its own tables: systems × maps × methods × seeds, in a domain.
 
     ``text`` and ``remarks`` are Markdown: the question before the tables, the answer after them.
     """
@@ -74,6 +83,7 @@ class Grid:
     title: str
     text: str
     remarks: str
+    domain: str
     systems: tuple[str, ...]
     maps: tuple[str, ...]
     methods: tuple[str, ...]
@@ -96,24 +106,25 @@ class Experiment:
     @property
     def runs(self) -> tuple[ExperimentRun, ...]:
         """All runs, each once: the first seed of every grid first, else in the file's order."""
-        found: dict[tuple[str, str, int], tuple[str, ...]] = {}
+        found: dict[tuple[str, str, str, int], tuple[str, ...]] = {}
         for turn in range(max(len(grid.seeds) for grid in self.grids)):
             for grid in self.grids:
                 for seed in grid.seeds[turn : turn + 1]:
                     for system in grid.systems:
                         for method in grid.methods:
-                            key = (system, method, seed)
+                            key = (grid.domain, system, method, seed)
                             found[key] = tuple(dict.fromkeys((*found.get(key, ()), *grid.maps)))
         return tuple(
             ExperimentRun(
                 system=system,
                 tests=self.systems[system],
+                domain=domain,
                 maps=maps,
                 method=method,
                 seed=seed,
                 budget=self.budget,
             )
-            for (system, method, seed), maps in found.items()
+            for (domain, system, method, seed), maps in found.items()
         )
 
 
@@ -154,7 +165,7 @@ def _named(table: Table, name: str) -> str:
 
 def _grid(top: Table, table: Table, systems: Collection[str]) -> Grid:
     table.refuse_unknown(
-        {"name", "title", "text", "remarks", "systems", "maps", "methods", "seeds"}
+        {"name", "title", "text", "remarks", "domain", "systems", "maps", "methods", "seeds"}
     )
     name = _named(table, table.string("name"))
     return Grid(
@@ -162,6 +173,7 @@ def _grid(top: Table, table: Table, systems: Collection[str]) -> Grid:
         title=table.string("title", name),
         text=table.string("text", "").strip(),
         remarks=table.string("remarks", "").strip(),
+        domain=(table if "domain" in table.values else top).string("domain", PAPER),
         systems=_some(table, "systems", allowed=systems)
         if "systems" in table.values
         else (*systems,),

@@ -40,6 +40,8 @@ PLAIN: dict[str, Any] = {
     "policy_sha256": "cccccccccccc",
     "version": "0.1.0",
     "package_sha256": "dddddddddddd",
+    "domain": "paper",
+    "engine": "bullet",
     "machine": "x86_64-avx2",
     "result_hash": "eeeeeeeeeeee",
     "limits": "0.75 m, 120 s, abort needless",

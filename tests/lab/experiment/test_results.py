@@ -50,6 +50,8 @@ def test_simultaneous_appends_lose_no_row(tmp_path: Path) -> None:
         process.join()
     found = read_rows(path)
     assert {each.key for each in found} == {
-        ("Lander", map, "garl", seed, 40) for map in ("court", "lawn") for seed in range(12)
+        ("Lander", map, "garl", seed, 40, "paper")
+        for map in ("court", "lawn")
+        for seed in range(12)
     }
     assert len(found) == 24

@@ -8,7 +8,8 @@ from lab.experiment.campaign import check_experiment
 from lab.experiment.spec import Experiment, read_experiment
 from pytest_garl.errors import ExperimentError, ScenarioError
 
-DOCS = Path(__file__).parents[3] / "docs" / "experiments"
+ROOT = Path(__file__).parents[3]
+SHIPPED = sorted(ROOT.glob("docs/results/experiments/*.toml"))
 TEXT = """
 title = "Mine"
 budget = 40
@@ -51,6 +52,17 @@ def test_every_run_is_flown_once_first_seeds_first(tmp_path: Path) -> None:
     ]
     assert {run.budget for run in found} == {40}
     assert found[0].tests == "test_one.py"
+
+
+def test_a_grid_may_have_a_domain_of_its_own(tmp_path: Path) -> None:
+    text = TEXT.replace('name = "RQ2"', 'name = "RQ2"\ndomain = "calm"')
+    found = plan(tmp_path, text).runs
+    assert {run.domain for run in found if run.seed == 3 and run.maps == ("lawn",)} == {"calm"}
+    assert {run.domain for run in found if run.system == "One"} == {"paper"}
+    # The same search in another domain is another one.
+    assert len({run.folder for run in found}) == len(found)
+    calm = TEXT.replace("budget = 40", 'budget = 40\ndomain = "calm"')
+    assert {run.domain for run in plan(tmp_path, calm).runs} == {"calm"}
 
 
 def test_a_method_may_name_another_npc_policy(tmp_path: Path) -> None:
@@ -140,6 +152,6 @@ def test_a_spec_without_grids_is_refused(tmp_path: Path) -> None:
         plan(tmp_path, TEXT.partition("[[grids]]")[0])
 
 
-@pytest.mark.parametrize("file", sorted(DOCS.glob("*.toml")), ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
 def test_every_shipped_experiment_can_be_flown(file: Path) -> None:
-    check_experiment(read_experiment(file), DOCS.parents[1])
+    check_experiment(read_experiment(file), ROOT)
