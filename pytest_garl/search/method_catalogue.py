@@ -3,8 +3,8 @@
 A shipped method is one module in ``search/methods/`` that declares ``METHOD``.  The method has the
 name of the file, with dashes for underscores.  A user's own method is named "module:factory".
 
-Every pytest run imports this module for ``--help``, so only the module of the method in use is
-imported.
+Every pytest run imports this catalogue for ``--help``.  So the catalogue imports only the module of
+the method in use.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def default_policy(name: str) -> str:
 
 
 def remembers(name: str) -> bool:
-    """Return whether a method uses an archive; a user's own may."""
+    """Return whether a method uses an archive; True for a user's own method, which may."""
     return name not in method_names() or declaration_of(name).remembers
 
 
@@ -68,9 +68,8 @@ def find_method(name: str) -> Callable[[SearchPlan], Method]:
 def make_method(name: str, plan: SearchPlan) -> Method:
     """Return a fresh search by the method called ``name``.
 
-    Raises GarlError if the method needs an extra that is not installed.  For a user's own method,
-    this function and the method that it returns raise GarlError if the method raises or returns
-    something invalid.
+    Raises GarlError if the method needs an extra that is not installed.  If a user's own method
+    raises, or returns something invalid, this function or the returned method raises GarlError.
     """
     if name not in method_names():
         from pytest_garl.search.user_method import UserMethod

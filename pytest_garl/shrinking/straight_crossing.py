@@ -1,7 +1,7 @@
 """The weakest adversary for a collision: somebody who knows nothing and walks straight across.
 
 The object that was hit comes alone, on a straight line through the place of the contact, at the
-contact's time.  It starts as far away as fits, so that it has its speed when it crosses.
+contact's time.  It starts as far away as there is room, so that it crosses at full speed.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from pytest_garl.simulation.physics.locomotion import STANDING_MPS, next_course
 Plane = tuple[float, float]
 
 USUAL_MPS = {"person": 1.4, "child": 2.0, "dog": 4.0}
-"""A preferred walk (Diedrich and Warren 1995: below the transition to a run at 2 m/s), a child that
-walks beside it, a trot (`object_types.py`)."""
+"""A person's preferred walk (Diedrich and Warren 1995: below the transition to a run at 2 m/s), a
+child beside such a walker, a dog's trot (`object_types.py`)."""
 LEAST_MPS = 0.5
-"""Slower than this nobody crosses a place; engineering estimate."""
+"""Nobody crosses a place more slowly than this; engineering estimate."""
 NEAREST_M, FARTHEST_M = 2.0, 8.0
-"""A walker starts so far from the place: outside of the UAV's way, and with its speed there."""
+"""A walker starts this far from the place: out of the UAV's way, with room to reach its speed."""
 SHIFTS_S = (-1.0, -2.0, 1.0, 2.0)
-"""By so much the entry is shifted to measure the window; the outer ones after the inner ones."""
+"""Shifts of the entry that measure the window: the inner ones before the outer ones."""
 _TURNS_RAD = tuple(sign * turn * math.pi / 8 for turn in range(9) for sign in (1, -1))
-"""Directions that are tried if the way is not free, from that of the contact on."""
+"""Turns from the course at the contact, tried in this order until a way is free."""
 BIRD_GAP_M = 0.5
-"""A bird keeps more than so far from what stands beside its way (`solids_ahead.py`)."""
+"""A bird keeps a larger distance from what stands beside its way (`solids_ahead.py`)."""
 THERE_M = 1.0
-"""A UAV so near to a place is there: its own length."""
+"""A UAV is at a place if it is no farther from it than this: its own length."""
 _STEP_S = 1 / 60
-"""The simulator moves objects so often."""
+"""The simulator moves objects at this interval."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ class Encounter:
 
     @property
     def usual_speed_mps(self) -> float:
-        """The speed of a crossing: that at the contact, or a usual one if that is lower."""
+        """The speed of a crossing: the speed at the contact, but at most a usual one."""
         if self.type.flies:
             return max(self.type.least_speed_mps, round(self.speed_mps, PLACE_DIGITS))
         usual = min(self.speed_mps, USUAL_MPS[self.type.name])
@@ -73,7 +73,7 @@ class Encounter:
 
 
 def encounter_of(flight: Flight, map: Map) -> Encounter | None:
-    """Return the encounter with the moving object that a flight ended with, None without one."""
+    """Return the encounter with a moving object that ended a flight, or None."""
     contact = flight.contacts[-1] if flight.contacts else None
     kinds = dict(map.all_objects)
     if contact is None or contact.body_class != "dynamic" or contact.body not in kinds:
@@ -98,9 +98,9 @@ def encounter_of(flight: Flight, map: Map) -> Encounter | None:
 
 
 def retimed_encounter(encounter: Encounter, missed: Flight) -> Encounter | None:
-    """Return an encounter at the time at which the UAV was there in a flight that missed it.
+    """Return an encounter at another time: when the UAV was there in a flight that missed it.
 
-    Returns None if the UAV was never there, or at about the encounter's time.
+    Returns None if the UAV was never there, or was there at about the encounter's time.
     """
     away_m = np.linalg.norm(missed.uav.position_m - np.array(encounter.uav_m), axis=1)
     if not len(away_m) or away_m.min() > THERE_M:
@@ -112,7 +112,7 @@ def retimed_encounter(encounter: Encounter, missed: Flight) -> Encounter | None:
 
 
 def _course_rad(hit: ObjectRecord, place_m: Plane, velocity_mps: Plane) -> float:
-    """Return the course at the contact; of an object that stood, from its start."""
+    """Return the course at the contact; for an object that stood, the direction from its start."""
     if math.hypot(*velocity_mps) > STANDING_MPS:
         return math.atan2(velocity_mps[1], velocity_mps[0])
     x, y = (float(value) for value in hit.track.position_m[0, :2])
@@ -120,7 +120,7 @@ def _course_rad(hit: ObjectRecord, place_m: Plane, velocity_mps: Plane) -> float
 
 
 def straight_crossing(bare: Scenario, encounter: Encounter, map: Map) -> Scenario | None:
-    """Return a scenario in which the object of an encounter crosses its place, careless.
+    """Return a scenario in which the object of an encounter crosses its place and is careless.
 
     ``bare`` is a scenario with no other object.  Returns None if no way there is free.
     """
@@ -129,7 +129,7 @@ def straight_crossing(bare: Scenario, encounter: Encounter, map: Map) -> Scenari
         for start, delay_s in _starts(encounter, course, map):
             scenario = _with_story(bare, encounter, start, delay_s, map)
             if not problems(scenario, map) and _is_free(encounter, start, map):
-                # What the repair would move would not come in time.
+                # An object that the repair moves would not be there in time.
                 repaired = repair(scenario, map)
                 if not _has_moved(scenario, repaired):
                     return repaired
@@ -137,7 +137,7 @@ def straight_crossing(bare: Scenario, encounter: Encounter, map: Map) -> Scenari
 
 
 def shifted(scenario: Scenario, name: str, by_s: float, map: Map) -> Scenario | None:
-    """Return the scenario with an entry shifted by a time; None if it began before the flight."""
+    """Return the scenario with an entry shifted by a time; None if that is out of range."""
     delay_s = scenario[f"{name}.delay_s"] + by_s
     if not 0 <= delay_s <= STORY["delay_s"].quantity.high:
         return None
@@ -149,7 +149,7 @@ def _starts(encounter: Encounter, course_rad: float, map: Map) -> Iterator[tuple
     x, y, _ = encounter.place_m
     speed = encounter.usual_speed_mps
     if encounter.type.flies:
-        # It enters at its full speed, at least so far away, wherever on the course it starts.
+        # A bird enters at full speed, at least ENTRY_M away, wherever on the course it starts.
         delay_s = encounter.time_s - ENTRY_M / speed
         for away_m in range(round(FARTHEST_M), 0, -1) if delay_s >= 0 else ():
             yield (x - away_m * math.cos(course_rad), y - away_m * math.sin(course_rad)), delay_s
@@ -162,14 +162,14 @@ def _starts(encounter: Encounter, course_rad: float, map: Map) -> Iterator[tuple
         dx, dy = walked_m(encounter.type, speed, course_rad, encounter.time_s - delay_s)
         if NEAREST_M <= math.hypot(dx, dy) <= FARTHEST_M:
             early.append(((x - dx, y - dy), delay_s))
-    # An entry that can be shifted both ways first.
+    # First the entries that can be shifted both ways.
     late = [each for each in early if each[1] >= max(SHIFTS_S)]
     yield from late
     yield from reversed([each for each in early if each not in late])
 
 
 def walked_m(kind: ObjectType, speed_mps: float, course_rad: float, time_s: float) -> Plane:
-    """Return how far an object gets that stands, faces east, and walks off on a course."""
+    """Return how far an object walks on a course, if at first it stands and faces east."""
     wanted = speed_mps * math.cos(course_rad), speed_mps * math.sin(course_rad)
     x = y = vx = vy = yaw = 0.0
     for _ in range(round(time_s / _STEP_S)):
@@ -195,7 +195,7 @@ def _with_story(
     }
     values = {f"{name}.velocity": kind.share_of(encounter.usual_speed_mps)}
     if kind.flies:
-        # Its own height may be lower than a stoop ends.
+        # The bird's own height may be below the end of a stoop.
         height_m = round(
             min(BIRD_HEIGHTS_M[1], max(BIRD_HEIGHTS_M[0], LEAST_HEIGHT_M, z)), PLACE_DIGITS
         )
@@ -212,7 +212,7 @@ def _is_free(encounter: Encounter, start: Plane, map: Map) -> bool:
     kind, (x, y, z) = encounter.type, encounter.place_m
     low_m, gap_m, end = z + kind.low_m, kind.radius_m, (x, y)
     if kind.flies:
-        # It enters far behind its start, and turns away from what stands ahead of it.
+        # A bird enters far behind its start, and turns away from what stands ahead of it.
         away_m = max(1e-9, math.dist(start, end))
         back_x, back_y = (start[0] - x) / away_m, (start[1] - y) / away_m
         ahead_m = 2 * kind.turn_radius_m
@@ -243,7 +243,7 @@ def _distance_m(start: Plane, end: Plane, disc: Disc) -> float:
 
 
 def _has_moved(scenario: Scenario, repaired: Scenario) -> bool:
-    """Return whether a place is another one, beyond the digits of files."""
+    """Return whether the repair moved a place by more than the rounding of files."""
     before, after = dict(scenario.genes), dict(repaired.genes)
     ends = (*MARKER_PLACE, "start_x", "start_y")
     return any(abs(before[key] - after[key]) > 1e-3 for key in before if key.endswith(ends))

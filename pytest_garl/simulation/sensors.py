@@ -32,8 +32,8 @@ from pytest_garl.simulation.timing import Timing
 class Delivery:
     """An observation as it reaches the landing system.
 
-    ``sight`` is what its picture shows, ``place_m`` where the UAV was when it was taken,
-    ``range_m`` the reading of the rangefinder: whoever asks the observation for it has read it.
+    ``sight`` is what the picture shows, and ``place_m`` is where the UAV was at that moment.
+    ``range_m`` is the rangefinder's reading; the observation notes whether somebody reads it.
     """
 
     observation: Observation
@@ -53,7 +53,7 @@ class _Picture:
 
 
 class Sensors:
-    """Takes pictures, puts a pose to each, and delivers them in order when they arrive."""
+    """Takes pictures, adds a pose to each, and delivers them in order, each when it is due."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class Sensors:
         self._under_way: deque[tuple[int, Delivery]] = deque()
 
     def switch_on(self, placed: Placed) -> None:
-        """Switch the camera on; without it frames are black and show nothing."""
+        """Switch the camera on; until then frames are black and show nothing."""
         camera = true_camera(self._camera, placed.scenario)
         self._renderer = renderer_of(placed, camera, self._moments)
         self._depth = DepthSensor(placed.scenario, camera)
@@ -119,7 +119,7 @@ class Sensors:
     def deliveries(self, tick: int, motion: Motion, estimate: Motion) -> Iterator[Delivery]:
         """Yield what reaches the landing system at this step of the physics, in order.
 
-        ``motion`` is the true one, ``estimate`` what the UAV's navigation says of it.
+        ``motion`` is the true motion; ``estimate`` is the navigation's estimate of it.
         """
         late = self._timing.stamp_ticks
         if late < 0:
@@ -149,7 +149,7 @@ class Sensors:
         self._pictures.append(picture)
 
     def _send(self, tick: int, picture: _Picture, pose: Motion) -> None:
-        """Put a pose to a picture, and send both on their way."""
+        """Add a pose to a picture, and send both to the landing system."""
         observation = observe(
             picture.frame,
             time_s=(tick + min(0, self._timing.stamp_ticks)) / PHYSICS_RATE_HZ,

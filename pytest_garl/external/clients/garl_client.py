@@ -52,7 +52,7 @@ class Observation:
 class Link:
     """The link of one flight; ``mission`` is the task, as the protocol describes it.
 
-    ``frame`` is "ENU" (and FLU) or "NED" (and FRD), for all that goes in and out.  ``reads`` names
+    ``frame`` is "ENU" (and FLU) or "NED" (and FRD), for all values read and sent.  ``reads`` names
     the data that the program uses: "image", "depth_m", "rangefinder_m".
     """
 
@@ -102,7 +102,7 @@ class Link:
         self.send("abort", **fields)
 
     def send(self, kind: str, **fields: Any) -> None:
-        """Answer the frame; ``diagnostics`` is a field of each command, a dict."""
+        """Answer the frame; every command may have the field ``diagnostics``, a dict."""
         if self._frame is None:
             raise RuntimeError("a second command for one frame; the first one is flown")
         self._write(dict(fields, type=kind, frame=self._frame))

@@ -1,7 +1,7 @@
-"""How many flights follow the searches, and how long all that is left takes.
+"""How many flights follow the searches, and how long the rest of the run takes.
 
-Nothing is forecast before some flights were flown: those of one landing system take 1 s, those of
-another 10 s, and the same on another machine half or twice as long.
+Nothing is forecast before some flights were flown: a flight takes 1 s with one landing system and
+10 s with another one, and half or twice as long on another machine.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from pytest_garl.plugin.session.run import Run
 from pytest_garl.triage.forecast import RemainingWork, expected_kinds, flights_after_search
 
 FIRST_FLIGHTS = 20
-"""The time left is forecast after this number of flights.  After eight, no kind had shown in a
-search of two times forty flights that found sixteen; it took 3.9 times as long as forecast then."""
+"""The time left is forecast after this number of flights.  After eight flights, two searches of
+forty had shown no kind; they found sixteen, and took 3.9 times as long as forecast then."""
 _FAILING_TIMES, _FAILING_FLIGHTS = 2.0, 2
-"""Until flights have failed, one is expected to take this many times as long as one that lands; the
-expectation counts as this number of flights."""
+"""Until flights have failed, a failing flight is expected to take the first number times as long
+as a landing; this expectation weighs as much as the second number of measured flights."""
 _ENOUGH_AFTER = 4
-"""Flights after the search from which the rest is forecast."""
+"""After this many flights beyond the search, the rest is forecast from their time."""
 _LEAST_BUSY = 0.5
-"""Workers that idle more than this do so because the search has just begun."""
+"""At least this share of workers is counted as busy: fewer are only while a search begins."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Forecast:
     """What is left of a run.
 
-    ``flights_after`` are the flights expected beside the searches, those flown included.
-    ``left_s`` is None while nobody knows.
+    ``flights_after`` is the expected number of flights after the searches, flown ones included.
+    ``left_s`` is None while it cannot be forecast.
     """
 
     flights_after: float
@@ -40,14 +40,14 @@ class Forecast:
 
 
 class NewKinds:
-    """Tells the kinds of violation of a run that no saved case knows."""
+    """Finds the kinds of violation in a run that no saved case expects."""
 
     def __init__(self, run: Run) -> None:
         self._run = run
         self._known: dict[str, frozenset[str]] = {}
 
     def found(self, ledger: Ledger) -> list[tuple[str, str]]:
-        """Return search and signature of each kind that was found so far."""
+        """Return search and signature of each such kind found so far."""
         return [
             (search, signature)
             for search, signature in ledger.queries.seconds_by_signature()
@@ -76,7 +76,7 @@ class TimeLeft:
         self._remaining_since = self._flown_then = 0.0
 
     def forecast(self, ledger: Ledger, now: float) -> Forecast:
-        """Return what is left at a time; the first call begins the clock."""
+        """Return what is left at the time ``now``; the first call starts the clock."""
         flown = ledger.queries.meters()
         after, flying_s = flown.get("on_demand", 0.0), flown.get("flying_s", 0.0)
         if self._began is None:
@@ -91,7 +91,7 @@ class TimeLeft:
         seconds = queries.flight_seconds()
         if searched + after < FIRST_FLIGHTS:
             return Forecast(flights_after=expected, left_s=None)
-        # What is shrunk flies as the violations did, or ends as they did.
+        # Flights that shrink a violation take as long as flights that fail.
         work_s = (wanted - searched) * seconds.of_search + (expected - after) * _failing_s(seconds)
         workers = self._busy_workers(flying_s, now)
         left_s = work_s / workers if workers else None
@@ -109,7 +109,7 @@ class TimeLeft:
         return searches * flights_after_search(each, options.shrink, cap)
 
     def _busy_workers(self, flying_s: float, now: float) -> float:
-        """Return how many workers fly at a time; 0 if nobody knows."""
+        """Return how many workers fly at a time; 0 if that is unknown."""
         assert self._began is not None
         passed_s, workers = now - self._began, self._run.options.workers
         flew_s = flying_s - self._flying_before_s
@@ -128,7 +128,7 @@ class TimeLeft:
         left_s = left * passed_s / done if done >= _ENOUGH_AFTER else by_plan_s
         return Forecast(
             flights_after=max(after, self._flown_then + self._remaining.flights),
-            # None if other causes take flights that nobody planned, or the plan took longer.
+            # None if the plan is used up: unplanned flights, or planned ones that took longer.
             left_s=left_s or None,
         )
 
