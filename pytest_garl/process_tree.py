@@ -1,6 +1,6 @@
-"""The operating system's processes: which of them live, and which are below one.
+"""The operating system's processes: which of them live, and which descend from one.
 
-Linux tells that in files; elsewhere, as on macOS, ``ps`` lists the processes.
+Linux lists them in files; elsewhere, such as on macOS, ``ps`` lists them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def alive(pid: int) -> bool:
         return False
     except PermissionError:
         return True
-    # A zombie has ended; only its parent has not asked for its status yet.
+    # A zombie has ended; its parent has not asked for its status yet.
     return not _has_proc() or _stat(pid)[:1] != ["Z"]
 
 
@@ -49,7 +49,7 @@ def children_of(parent: int) -> Iterator[int]:
 
 
 def descendants_of(ancestor: int) -> set[int]:
-    """Return the ids of all processes below one, zombies included."""
+    """Return the ids of a process's descendants, zombies included."""
     found: set[int] = set()
     new = {ancestor}
     listed = [] if _has_proc() else _listed()
@@ -69,7 +69,7 @@ def kill(pids: Iterable[int]) -> None:
 
 
 def _children_by_thread(parent: int) -> set[int]:
-    """Return a process's children from the lists of its threads, which need no look at others."""
+    """Return a process's children, as its threads list them; no other process is read."""
     found: set[int] = set()
     for file in Path(f"/proc/{parent}/task").glob("*/children"):
         # A process or a thread may end meanwhile.
@@ -87,12 +87,12 @@ def _stat(pid: int) -> list[str]:
 
 
 def _has_proc() -> bool:
-    """Return whether the system tells about processes in files."""
+    """Return whether the system lists its processes in files."""
     return Path("/proc/self/stat").exists()
 
 
 def _listed() -> list[tuple[int, int, str]]:
-    """Return id, parent and command line of all processes but the one that lists them."""
+    """Return id, parent and command line of all processes except the one that lists them."""
     listing = subprocess.Popen(
         ["ps", "-A", "-o", "pid=", "-o", "ppid=", "-o", "command="],
         stdout=subprocess.PIPE,

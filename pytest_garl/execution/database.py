@@ -42,13 +42,13 @@ SearchKind = Literal["search", "case", "on_demand"]
 """The purpose of flights: a search's budget, saved cases, or flights on demand, such as a second
 flight of a violation.  Figures and the result hash cover the searches alone."""
 BEHIND_SEARCHES, BEFORE_SEARCHES = -1, 1
-"""Priorities of flights that are flown when no flight of a search waits, or before those of
-searches, whose priority is 0."""
+"""Priorities of flights that are flown when no flight of a search waits, and of flights that are
+flown before those of searches.  The priority of a search is 0."""
 LOCKED_S = 300.0
 """How long a statement waits for another process that holds the ledger's lock.  Ours hold it for
-milliseconds; one that a landing system has left holds it until its flight ends."""
+milliseconds; a process that a landing system left behind holds it until its flight ends."""
 _BUSY_S = 1.0
-"""How long SQLite itself waits, during which no signal is handled."""
+"""How long SQLite itself waits; meanwhile no signal is handled."""
 _LONGEST = 64_000_000
 """Most bytes of one value: a damaged file may declare a value that fills the memory."""
 
@@ -73,7 +73,7 @@ class Rows:
 
 
 class _Connection(sqlite3.Connection):
-    """A connection that closes itself if an error left it open: since 3.13 Python warns of it."""
+    """A connection that closes itself if an error left it open, of which Python 3.13 warns."""
 
     def __del__(self) -> None:
         with contextlib.suppress(sqlite3.Error):
@@ -102,7 +102,7 @@ class Database:
             self._connection.executescript(SCHEMA)
 
     def execute(self, sql: str, values: Sequence[Any] = ()) -> Rows:
-        """Run one statement and fetch its rows at once, since only then a damaged page shows."""
+        """Run one statement and fetch its rows at once: a damaged page shows only then."""
         until = monotonic() + LOCKED_S
         with self._explained():
             while True:
@@ -149,7 +149,7 @@ class Database:
 
 
 def set_aside(path: Path) -> None:
-    """Rename an older ledger, with all that its log holds, before a new one is created."""
+    """Rename an older ledger, with its log merged into it, before a new one is created."""
     with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(path)) as old:
         old.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     for suffix in ("-wal", "-shm"):

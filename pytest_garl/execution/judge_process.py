@@ -1,7 +1,8 @@
-"""A process that judges flights which were flown in this one, where the landing system's code ran.
+"""A second process that judges the flights of this one, in which the landing system's code ran.
 
-Flights without workers, `garl check` and a case that is flown without pytest fly in the process
-that asks for them.  The landing system may have replaced what judges there, such as `math.hypot`.
+Without workers, in `garl check`, and for a case that is flown without pytest, a flight runs in the
+process that asks for it.  There the landing system may have replaced what a verdict needs, such as
+`math.hypot`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from pytest_garl.verdicts.verdict import Limits
 
 
 class JudgeProcess(AskedProcess):
-    """Judges flights in a process of its own, which starts with the first ``start`` or flight."""
+    """Judges flights in a process of its own, which starts with ``start`` or the first flight."""
 
     def __init__(self) -> None:
         super().__init__(__name__, "that judges flights")
@@ -49,7 +50,7 @@ class JudgeProcess(AskedProcess):
         return FlightResult.from_json(answer["result"]), answer["sha256"], answer["wall_s"]
 
     def judge_flight(self, flight: Flight, limits: Limits) -> FlightResult:
-        """Return the result of a flight of which nobody keeps the record, without its severity.
+        """Return the result, without severity, of a flight whose record nobody keeps.
 
         The built-in simulator has flown it.
         Raises NotFiniteError if the flight holds a NaN or an infinity.

@@ -59,7 +59,7 @@ def locked(folder: Path) -> Iterator[None]:
             f"{folder}: nothing can be saved here ({error}); choose another folder of cases "
             "with the ini key garl_cases"
         ) from error
-    # Windows has none, and saves nothing.
+    # Windows has no fcntl; nothing is saved there.
     import fcntl
 
     try:
@@ -84,6 +84,6 @@ def _exists(pid: int) -> bool:
     except ProcessLookupError:
         return False
     except OSError:
-        # It is another user's.
+        # The process is another user's.
         return True
     return True

@@ -1,9 +1,8 @@
 """Learning in NumPy: the gradient of a Q-network, Adam, and learning when to go.
 
-It runs where nobody has installed torch: on the machine of whoever searches.  One thread, double
-precision and a seed of its own: the same rows give the same bytes on every CPU, within what
-:mod:`pytest_garl.cpu_dispatch` pins.  Torch's gradient is the same within rounding, and a test
-holds that.
+It needs no torch, because it runs on the user's machine.  It uses one thread, double precision and
+its own seed, so the same rows give the same bytes on every CPU that :mod:`pytest_garl.cpu_dispatch`
+makes alike.  A test checks that torch's gradient is the same within rounding.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ def _backwards(layers: Layers, signals: Sequence[Array], slope: Array) -> Layers
     gradient: list[tuple[Array, Array]] = []
     for signal, (weight, _) in zip(reversed(signals[:-1]), reversed(layers), strict=True):
         gradient.append((slope.T @ signal, slope.sum(axis=0)))
-        # The signal is what ReLU let through: where it is 0 nothing follows from the weights.
+        # The signal is what ReLU let through: where it is 0, the weights have no effect.
         slope = (slope @ weight) * (signal > 0)
     return tuple(reversed(gradient))
 
@@ -80,10 +79,10 @@ class Adam:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stopping:
-    """One thing that waits, with what each of its decisions is worth.
+    """One thing that waits, with the worth of each of its decisions.
 
-    ``states`` (n, inputs) are the inputs at its decisions, ``go`` (n,) what to go at each is worth,
-    and ``never`` what never to go is worth.
+    ``states`` (n, inputs) are the inputs at its decisions, ``go`` (n,) is the worth of going at
+    each, and ``never`` is the worth of never going.
     """
 
     states: Array
@@ -95,7 +94,7 @@ class Stopping:
 class StoppingRate:
     """The settings of learning when to go.
 
-    ``imitates`` steps begin with the decisions of a rule, the ``steps`` after them follow the
+    The first ``imitates`` steps learn the decisions of a rule; the next ``steps`` steps follow the
     gradient of the expected worth.  A network that has imitated for long is so sure that it learns
     nothing more.  ``shrinks`` is the weight of the squared weights.
     """
@@ -115,11 +114,11 @@ def learned_when_to_go(
 ) -> Network:
     """Return the network after learning when to go.
 
-    At each decision a thing goes with the probability σ(go - wait).  As every decision's worth is
-    known, so is the expected worth of each thing, J, and its gradient, without a sample:
+    At each decision a thing goes with the probability σ(go - wait).  The worth of every decision is
+    known, so the expected worth J of each thing and its gradient need no samples:
     ∂J/∂(go - wait) = S p (1 - p) (worth of go - expected worth of waiting), where S is the
-    probability that the thing still waits.  ``rule`` (n,) says for all decisions in a row whether a
-    rule goes: from there learning starts.  Weights shrink towards 0, or ``towards`` other ones.
+    probability that the thing still waits.  ``rule`` (n,) says for each decision, thing by thing,
+    whether a rule goes; learning starts from it.  Weights shrink towards 0, or ``towards`` other ones.
     """
     layers = network.layers
     origin = towards or tuple((np.zeros_like(w), np.zeros_like(b)) for w, b in layers)
@@ -129,7 +128,7 @@ def learned_when_to_go(
     for step in range(settings.imitates + settings.steps):
         signals = _signals(layers, states)
         goes = 1 / (1 + np.exp(np.clip(signals[-1][:, 0] - signals[-1][:, 1], -50, 50)))
-        # At first that of the cross-entropy between the rule and the network.
+        # At first it is the slope of the cross-entropy between the rule and the network.
         imitates = step < settings.imitates
         slope = (goes - rule) / len(rule) if imitates else table.slope(goes)
         gradient = _backwards(layers, signals, np.stack([-slope, slope], axis=1))
@@ -154,7 +153,7 @@ class _StoppingTable:
             self._go[row, : len(each.go)], self._is_one[row, : len(each.go)] = each.go, True
 
     def slope(self, goes: Array) -> Array:
-        """Return by how much the mean loss grows with each decision's go - wait, (n,)."""
+        """Return the slope of the mean loss over each decision's go - wait, (n,)."""
         count, longest = self._go.shape
         share = np.zeros((count, longest))
         share[self._is_one] = goes
