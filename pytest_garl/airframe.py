@@ -22,7 +22,7 @@ MAX_RATE_HZ = 240.0
 """The rate of the physics: nothing can be asked more often."""
 
 MOST_WIDENING = 3.0
-"""A lens may show at most so many times the width and the height that a pinhole with the same
+"""A lens may show at most this multiple of the width and the height that a pinhole with the same
 picture and focal length shows."""
 _MOST_PIXELS = 3840 * 2160
 Vector = tuple[float, float, float]

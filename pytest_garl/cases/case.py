@@ -37,14 +37,14 @@ NO_GATE_TEXTS: Mapping[NoGateReason, str] = MappingProxyType(
 )
 """The reasons in words."""
 ESCAPE_STEP_S = 0.5
-"""Escapes are looked for so long before a collision, and at whole multiples of it."""
+"""Escapes are searched for this long before a collision, and at whole multiples of this time."""
 LONGEST_ESCAPE_S = 5.0
-"""Escapes begin at most so long before the contact."""
+"""Escapes begin at most this long before the contact."""
 REACTION_S = 0.3
-"""From the first observation to the first command of an escape takes so long: three frames at the
-default rate, in which a system notices, decides and its latency passes; engineering estimate."""
+"""Time from the first observation to the first command of an escape: three frames at the default
+rate, in which a system notices and decides, and its latency passes; engineering estimate."""
 OBSERVED_WITHIN_S = LONGEST_ESCAPE_S + REACTION_S
-"""What the camera showed earlier does not count: no escape begins so early."""
+"""An earlier picture does not count: no escape begins that early."""
 Escape = Literal["flight", "motors off"]
 """How a collision could have been escaped: by flying on, or, by a UAV that stands on the ground, by
 stopping the motors."""

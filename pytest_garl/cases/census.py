@@ -101,7 +101,7 @@ def _holds_a_case(path: Path) -> bool:
             return False
         content = path.read_bytes()
     except OSError:
-        # What cannot be read was no case that could be flown yesterday.
+        # A file that cannot be read was no case that could be flown yesterday.
         return False
     return all(sign in content for sign in _SIGNS_OF_A_CASE)
 

@@ -7,7 +7,7 @@ import itertools
 from pytest_garl.flight.flight import Flight, Step
 
 OBSERVABLE_PX = 20
-"""A body is observable if it has at least so many pixels in two successive frames: some four by
+"""A body is observable if it has at least this many pixels in two successive frames: some four by
 five pixels are what a detector of motion or of objects needs at least; engineering estimate."""
 
 

@@ -184,7 +184,7 @@ def renewal_by(
 def _severity_of(case: Case, flight: Flight | None, verdict: Verdict, map: Map) -> Severity:
     """Return what a case takes in today's words, if that are conditions.
 
-    What moves a body is in its own file, which need not be there any more.
+    The policy that moves a body is in its own file, which may be gone.
     """
     if flight is None or case.severity.about != "conditions" or case.policy not in READ_STORIES:
         return case.severity

@@ -238,7 +238,7 @@ def promote(project: _Project, files: tuple[Path, ...]) -> None:
         except GarlError as error:
             refused.append(str(error))
             continue
-        # What passes is not unpreventable.
+        # A case that passes is not unpreventable.
         reason: NoGateReason = "edge" if case.edge else ""
         replace_file(file, dataclasses.replace(case, status="fixed", reason=reason), project.maps)
         for line in (f"{file}: fixed; from now on it must pass", *remarks):

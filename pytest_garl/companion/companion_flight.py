@@ -49,10 +49,10 @@ LINK_BY_S = 30.0
 MOST_MESSAGE = 2**24
 """Bytes of a message from the process: all that it may hold is cut before."""
 TARGET_FOR_S = 1.0
-"""So long a landing target that the program told of is what it takes for the marker."""
+"""For this time a landing target that the program sent counts as what it takes for the marker."""
 QUIET_S: float | None = 1.5
 STACK_S = 0.1
-"""After so much wall time a program is asked where it is, and so long it has to say it."""
+"""After the first wall time a program is asked where it is; within the second it must answer."""
 ASKED = signal.SIGRTMAX - 1 if hasattr(signal, "SIGRTMAX") else signal.SIGUSR2
 NOTE_CHARS = 900
 FARTHEST_M = 100.0
@@ -142,7 +142,7 @@ class CompanionFlight:
 
     @property
     def returns_since_s(self) -> float | None:
-        """Since when the vehicle returns home, as it was told; None if it does not."""
+        """Since when the vehicle returns home on command; None if it does not."""
         return self._autopilot.returns_since_s
 
     def close(self) -> None:

@@ -34,9 +34,9 @@ class CompanionProgram(ProgramSystem):
     or ``python -m package``.  Words in braces are replaced by facts of the mission:
     ``{marker_id}``,
     ``{marker_side_m}``, ``{marker_dictionary}``, ``{lat_deg}``, ``{lon_deg}``, ``{north_m}``,
-    ``{east_m}`` (the told coordinate), ``{search_altitude_m}``, ``{width_px}``, ``{height_px}``,
-    ``{focal_px}``.  Paths begin at ``folder``, by default the folder of the module that makes this
-    object, and the program runs there.
+    ``{east_m}`` (the mission's coordinate), ``{search_altitude_m}``, ``{width_px}``,
+    ``{height_px}``, ``{focal_px}``.  Paths begin at ``folder``, by default the folder of the module
+    that makes this object, and the program runs there.
 
     ``camera`` is what ``cv2.VideoCapture`` shows, ``vehicle`` what it commands.  ``airframe`` has
     more of the vehicle, such as a rangefinder; its camera counts if ``camera`` is not given.

@@ -172,7 +172,7 @@ class WorkQueue:
         )
 
     def release(self, pid: int) -> None:
-        """Give back all slots of a process, as if it had not claimed them."""
+        """Give back all slots of a process; the claims do not count."""
         self._database.execute(
             "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, "
             "attempts = attempts - 1 WHERE pid = ? AND state = 'claimed'",
@@ -180,7 +180,7 @@ class WorkQueue:
         )
 
     def give_back(self, claim: Claim) -> None:
-        """Give back one slot, as if it had not been claimed."""
+        """Give back one slot; the claim does not count."""
         self._hand_out(claim, claim.attempt - 1, claim.earlier_exits)
 
     def fly_alone(self, claim: Claim, earlier_exits: str) -> None:

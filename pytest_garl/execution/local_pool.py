@@ -30,7 +30,7 @@ from pytest_garl.process_tree import descendants_of, kill
 from pytest_garl.scenarios.files import parse_scenario
 
 SILENT_LIMITS = 3
-"""For so many limits of a call a worker's supervisor may show no sign of life."""
+"""For this many limits of a call a worker's supervisor may show no sign of life."""
 TURN_S = 0.02
 """How long one turn of a pool waits for its workers."""
 MAX_IDLE_EXITS = 3
@@ -238,7 +238,7 @@ class ProcessPool:
 
 
 def local_pool(queue: WorkQueue, workers: int, checkout: Checkout | None = None) -> Pool:
-    """Return a pool of so many worker processes; with 0 it flies in this process.
+    """Return a pool of ``workers`` worker processes; with 0 it flies in this process.
 
     If this process would compute other bytes than a worker, 0 means one worker.  With a
     ``checkout`` the workers import the landing system from that folder alone.

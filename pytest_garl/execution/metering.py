@@ -10,7 +10,7 @@ from time import process_time
 from types import FrameType
 
 HUNG_S = 30.0
-"""A call hangs if it takes more wall time: a search allows so much if the slot flies alone."""
+"""A call hangs if it takes more wall time; a search allows this much if the slot flies alone."""
 
 
 class OutOfTimeError(Exception):

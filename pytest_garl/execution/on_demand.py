@@ -30,8 +30,8 @@ from pytest_garl.scenarios.scenario import Scenario
 
 T = TypeVar("T")
 PATIENCE_S = 0.01
-"""How long the next request of a procedure is waited for.  Most take a millisecond; whoever plans
-an escape takes seconds, in which the others' flights go on."""
+"""How long the next request of a procedure is waited for.  Most take a millisecond; planning an
+escape takes seconds, in which the flights of the others go on."""
 
 
 class FlyFunction(Protocol):

@@ -23,7 +23,7 @@ from typing import Any
 from pytest_garl.errors import GarlError
 
 LONGEST_LOOK_S = 1.0
-"""So much of the time between two looks at a heartbeat counts."""
+"""At most this much of the time between two looks at a heartbeat counts."""
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _LOOKS_EVERY_S = 0.5

@@ -62,7 +62,7 @@ STDERR_WAIT_MS = 50
 STDERR_BYTES = 2**14
 """How much of a flying process's stderr is kept; its end says why the process died."""
 STANDSTILL = 12
-"""If the landing system is not called for so many limits of a call, the flight stands still: a
+"""If the landing system is not called for this many limits of a call, the flight stands still: a
 thread holds the interpreter, or an import does not return.  The simulator's own work between two
 calls takes a second at most."""
 LEAST_STANDSTILL_S = 120.0

@@ -87,7 +87,7 @@ class SlotJudge:
                 self._queue = WorkQueue.open(self._ledger, self._worker, end_flying)
             claim = self._queue.claim_of(self._worker)
             if claim is None:
-                # The slot was given back: whoever claims it now flies it again.
+                # The slot was given back: the worker that claims it now flies it again.
                 return None
             job, scenario = parse_job(claim.job), parse_scenario(claim.scenario)
             try:

@@ -18,7 +18,7 @@ from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.flight.flight import Crash
 
 RETRY_LIMIT_FACTOR = 3.0
-"""A flight that is repeated alone gets so many times the limit of a call."""
+"""A flight that is repeated alone gets this many times the limit of a call."""
 ATTEMPTS = 3
 """If a slot hangs, is killed and makes the simulator fail, once each, it stays inconclusive."""
 

@@ -7,7 +7,7 @@ The steps of a flight:
 2. A flight starts the program anew in a process of its own (``child.py``), so that no flight knows
    of another one.  It takes a millisecond for C++, 0.1 s for Python with OpenCV, seconds for ROS 2.
 3. Each line on its stdin is one request, each line on its stdout one answer (``protocol.py``, and
-   ``docs/protocol.md`` for whoever writes the other side).  The simulated time stands still until
+   ``docs/protocol.md`` for authors of the other side).  The simulated time stands still until
    the answer is there.
 4. Pictures do not pass the pipe: they are written into memory that both processes map
    (``frame_memory.py``), and only if the program has said that it reads them.

@@ -2,7 +2,7 @@
 
 ENU is x east, y north, z up, with the body's x forward, y left, z up (FLU).  NED is x north, y
 east, z down, with the body's x forward, y right, z down (FRD).  Values that are no numbers pass
-unchanged: whoever reads them next says what is wrong with them.
+unchanged: the next reader says what is wrong with them.
 """
 
 from __future__ import annotations

@@ -24,8 +24,8 @@ ENDING_S = 1.0
 REASON = re.compile(r"^(?:[\w.]*(?:Error|Exception)\b.*|\s*what\(\):.*)$", re.MULTILINE)
 """What Python and C++ write of an exception that nobody has caught."""
 QUIET_S = 2.0
-"""After so much time without an answer it is said on stderr what is waited for: if the call then
-takes too long, the report of it has that line."""
+"""After this time without an answer, stderr says what is waited for.  If the call then takes too
+long, its report has that line."""
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _prctl = getattr(ctypes.CDLL(None), "prctl", None)

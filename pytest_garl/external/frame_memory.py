@@ -39,7 +39,7 @@ class FrameMemory:
         self._bytes = max(end, ALIGNED_BYTES)
         self._file = os.memfd_create("garl-frames", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
         os.ftruncate(self._file, self._bytes)
-        # Whoever maps memory that another process cuts dies when it reads there.
+        # A process that reads mapped memory which another process has cut dies.
         fcntl.fcntl(self._file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW)
         self._memory = mmap.mmap(self._file, self._bytes)
         self._arrays = {

@@ -1,6 +1,6 @@
 """The lines between pytest-garl and a program: requests and answers, in version 1.
 
-``docs/protocol.md`` describes them for whoever writes the other side.
+``docs/protocol.md`` describes them for authors of the other side.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def step_line(number: int, observation: Observation, hello: Hello) -> bytes:
 def read_command(line: bytes, number: int, hello: Hello) -> Command:
     """Return the command in an answer; raise BadMessageError if it is none.
 
-    The numbers are checked by whoever takes the command, as those of a class are.
+    The receiver of the command checks the numbers, as it checks those of a class.
     """
     answer = _read(line, *COMMANDS)
     if answer.get("frame") != number:

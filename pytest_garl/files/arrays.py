@@ -50,7 +50,7 @@ def _check(members: list[zipfile.ZipInfo], limit: int) -> None:
     for member in members:
         if not member.filename.endswith(".npy"):
             raise ValueError(f"found the member {shown(member.filename)}, expected arrays (.npy)")
-        # What others unpack at once may be larger than it says.
+        # An archive that others unpack at once may be larger than it says.
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise ValueError(
                 f"{shown(member.filename)}: found the compression {member.compress_type}, "

@@ -141,7 +141,7 @@ class MarkerView:
 class NominalView:
     """The marker as a level camera sees it from where a nominal landing looks.
 
-    ``place`` is "search" for a place of the search above the told coordinate, or "above" for a
+    ``place`` is "search" for a place of the search above the mission's coordinate, or "above" for a
     place above the marker; ``height_m`` is that of the camera's UAV; ``time_s`` is when a nominal
     flight is there, and ``duration_s`` how long it looks from there.  ``attempt`` is 0 for the
     first landing; if it waits above the marker and comes down again, that has the next number.

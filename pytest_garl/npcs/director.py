@@ -69,7 +69,7 @@ which the UAV climbed, or neither climbed nor sank.
 AT = {name: index for index, name in enumerate(FEATURES)}
 SCALE_M, SCALE_MPS, SPEED_MPS, BODY_M, SCALE_S, LONG_S = 10.0, 3.0, 8.0, 3.0, 5.0, 20.0
 SLOWEST_MPS = 0.2
-"""A UAV that does not sink is taken to sink so fast, which is never in time."""
+"""A UAV that does not sink counts as sinking at this speed, which is never in time."""
 
 NEAR_M = 3.0
 """A UAV that is farther from the marker still flies in."""

@@ -37,10 +37,10 @@ from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
 FRAME_S = 0.1
 """A body is seen if it is in the picture now and was one frame of the default camera before."""
 NOTICED_S = 0.3
-"""From the first sight to the first command of an escape takes so long, as in the question whether
-a real collision was preventable (:data:`pytest_garl.cases.case.REACTION_S`)."""
+"""Time from the first sight to the first command of an escape, as in the question whether a real
+collision was preventable (:data:`pytest_garl.cases.case.REACTION_S`)."""
 ESCAPE_S = 1.0
-"""A UAV needs so long to get out of the way: of the 41 collisions that
+"""A UAV needs this time to get out of the way: of the 41 collisions that
 docs/results/preventability.csv asked about, each had an escape 1 s before the contact, and half of
 them none 0.5 s before it."""
 WITHIN_S = 5.3
@@ -54,7 +54,7 @@ TICKS_PER_NPC_STEP = 4
 AFTERMATH_STEPS = 6
 """Half seconds for which an NPC is moved on after its time: it may collide as it leaves."""
 WATCHES_S = 0.5 + max(limits.delay_s for limits in GRADE_LIMITS.values())
-"""What an NPC saw so long before it begins may still reach its mind."""
+"""What an NPC saw up to this long before it begins may still be perceived."""
 _STEPS = round(DECISION_STEP_S * PHYSICS_RATE_HZ / TICKS_PER_NPC_STEP)
 _NEAR_M = 0.3
 """Bodies whose bounds are farther apart are not measured."""
@@ -200,7 +200,7 @@ class Passage:
         placed = Placed(begins_at(self._scenario, self._name, moment_s), self._map)
         policy = self._policy()
         npc = Npc(placed, self._name, policy)
-        # What it sees before it begins reaches its mind later; a body that waits does not move.
+        # It perceives later what it sees before it begins; a body that waits does not move.
         first = max(0, round((moment_s - WATCHES_S) / DECISION_STEP_S)) * _STEPS
         policy.reset(self._situation(npc, placed, first), np.random.default_rng(0))
         way, contact_s, nearest, left = [], None, (math.inf, 0.0), AFTERMATH_STEPS

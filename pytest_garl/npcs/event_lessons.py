@@ -50,8 +50,7 @@ SURE = 4.0
 smaller one would stop most landings before they come to 3 m, and nothing would be learned of later
 moments."""
 MOST_FLIGHTS = 40
-"""It learns from the latest flights, at most so many, so that a generation takes a third of a
-second."""
+"""It learns from at most this many latest flights: a generation then takes a third of a second."""
 MOST_STRIKES = 400
 RATE = StoppingRate(imitates=0, steps=40, learning_rate=0.03, shrinks=1e-3)
 LEAST_GAIN = 0.02
@@ -60,7 +59,7 @@ rule."""
 OTHER_EVENT = 0.2
 """Weight of what followed another kind of event in the same state."""
 GUESS, GUESS_WEIGHT = 0.1, 2.0
-"""Before any strike it is taken to be followed by a violation so often, as if two flights said so;
+"""Before any strike, this share of strikes is expected to violate, with the weight of two flights;
 later the mean of all strikes takes the place of that guess."""
 WIDTHS: Mapping[str, float] = {
     "height": 0.2,

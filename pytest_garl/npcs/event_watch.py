@@ -3,7 +3,7 @@
 Every half second it gets a few numbers about the UAV, and answers for each event that waits: wait,
 or strike now.  It is an adversary that watches as a chasing NPC does: where the UAV is and how it
 moves it knows half a second late, the moments of the landing and whether the marker can be read at
-once.  What the landing system thinks it never knows.
+once.  It never knows what the landing system believes.
 """
 
 from __future__ import annotations

@@ -118,7 +118,8 @@ def learned_when_to_go(
     known, so the expected worth J of each thing and its gradient need no samples:
     ∂J/∂(go - wait) = S p (1 - p) (worth of go - expected worth of waiting), where S is the
     probability that the thing still waits.  ``rule`` (n,) says for each decision, thing by thing,
-    whether a rule goes; learning starts from it.  Weights shrink towards 0, or ``towards`` other ones.
+    whether a rule goes; learning starts from it.  Weights shrink towards 0, or towards those of
+    ``towards``.
     """
     layers = network.layers
     origin = towards or tuple((np.zeros_like(w), np.zeros_like(b)) for w, b in layers)

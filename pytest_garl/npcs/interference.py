@@ -20,13 +20,13 @@ from pytest_garl.scenarios.story import APPROACH_S, LIMITS_S, Story, story_of
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, STAY, Move, Situation
 
 LEAVES_TO_M = 15.0
-"""An NPC leaves at least so far from the marker: out of sight of the UAV above it."""
+"""An NPC leaves to at least this distance from the marker: out of sight of the UAV above it."""
 DRAWN_DELAY_S = 10.0
-"""If the scenario has no story, an NPC comes at most so long after its phase."""
+"""If the scenario has no story, an NPC comes at most this long after its phase."""
 DRAWN_REACH_M = 3.0
-"""If the scenario has no story, a careless NPC crosses at most so far from the marker."""
+"""If the scenario has no story, a careless NPC crosses at most this far from the marker."""
 _MARGIN_M = 0.01
-"""A disc is looked at closely if it lies so much farther from a line than it reaches."""
+"""A disc that lies at most this much farther from a line than it reaches is examined closely."""
 Vector = tuple[float, float, float]
 
 
@@ -69,7 +69,7 @@ class Perception:
 
     @property
     def sighting(self) -> Sighting | None:
-        """What has reached the NPC's mind; None if it saw nothing at that moment."""
+        """What the NPC perceives; None if it saw nothing at that moment."""
         if len(self._seen) < (self._seen.maxlen or 1) or self._seen[0] is None:
             return None
         position, velocity = self._seen[0]

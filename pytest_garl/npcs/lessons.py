@@ -48,7 +48,7 @@ STEADY_S = 2.0
 """The speed of a UAV is that of its last two seconds."""
 STEP_S = 0.1
 NEAR_MISS_M = 3.0
-"""An NPC that comes so near, and no nearer, is worth nothing."""
+"""An NPC that comes this near, and no nearer, is worth nothing."""
 NEAR_MISS_WORTH = 0.05
 """Worth of an NPC that nearly meets the UAV: the smallest margin decides where nothing happens."""
 KINDS = ("they meet unseen", "they meet in view", "they do not meet")

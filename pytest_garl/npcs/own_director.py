@@ -21,7 +21,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 
 MOST_LESSONS = 80
-"""It learns from the latest lessons, at most so many: 20 generations then take 3 s."""
+"""It learns from at most this many latest lessons: 20 generations then take 3 s."""
 RATE = StoppingRate(imitates=0, steps=40, learning_rate=1e-3, shrinks=1e-2)
 
 

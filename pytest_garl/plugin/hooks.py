@@ -105,7 +105,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if options.repeat:
         from pytest_garl.plugin.items.repeated import read_repeated
 
-        # What cannot be read ends the session before anything is collected or flown.
+        # An option that cannot be read ends the session before anything is collected or flown.
         config.stash[REPEATED] = read_repeated(options)
     if options.baseline is not None:
         from pytest_garl.plugin.session.baseline_gate import register

@@ -13,7 +13,7 @@ import pytest
 from pytest_garl.plugin.xdist import WIDTH
 
 MOST_NAMED = 5
-"""A line names so many flights and counts the rest."""
+"""A line names this many flights and counts the rest."""
 _NARROW = 40
 _HARD_SPACE = "\N{NO-BREAK SPACE}"
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|m/s|m|s)(?!\w))")

@@ -47,7 +47,7 @@ class Arm:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AtEqualFlights:
-    """How many kinds so many flights of each arm show.
+    """How many kinds each arm shows in ``flights`` flights.
 
     An arm with more flights shows this many on average, over all ways to draw ``flights`` of them;
     ``random_range`` and ``later_range`` hold 95 % of the draws.

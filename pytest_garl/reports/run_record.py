@@ -147,7 +147,7 @@ class KindRecord:
 
     @property
     def least(self) -> str:
-        """What it takes at the least, of a shrunk case; else what was unusual in its flights.
+        """The least that a shrunk case takes; otherwise what was unusual in its flights.
 
         It may be empty.
         """
@@ -386,7 +386,7 @@ class SearchRecord:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """How diverse its kinds are, and all that is told of it."""
+        """How diverse its kinds are, and all that is reported of it."""
         return tuple(filter(None, (self.diversity, *self.told.values())))
 
     @property

@@ -303,7 +303,7 @@ class Placed:
         """Where the UAV is at the start, (x, y, height of its feet or of a hovering body).
 
         A hover begins at the nearest place that is 2 m clear of every static body, because an error
-        of the told coordinate may put the start into a tree.
+        of the mission's coordinate may put the start into a tree.
         """
         start = self.scenario.task.start
         if not start.hovers:

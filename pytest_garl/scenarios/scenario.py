@@ -20,7 +20,7 @@ class Scenario:
 
     ``genes`` holds (key, value) pairs in the genome's order, values in gene units: for
     example ``("environment.fog", 0.05)``, ``("marker.x", -0.3)``,
-    ``("person-1.velocity", 0.8)``.  What a value means in metres or lux is said by the
+    ``("person-1.velocity", 0.8)``.  The meaning of a value in metres or lux is said by the
     genome's properties and the simulator.  ``seed`` feeds the sensor noise, the falling
     particles and the undirected object moves; it does not depend on the scenario's slot.
     ``removed_objects`` names the objects of the map that this scenario flies without; they have no

@@ -36,7 +36,7 @@ that lands before walking on."""
 CHASE_S = 5.0
 """Longest chase, as the design of the grades says."""
 APPROACH_S = 10.0
-"""An NPC that has come and perceives no UAV for so long leaves: engineering estimate."""
+"""An NPC that has come, and perceives no UAV for this time, leaves: engineering estimate."""
 WALKERS_AND_BIRDS = ("person", "child", "dog", "bird")
 LONGEST_PAUSE_S = 60.0
 """So that a pad exists that is blocked for longer than a landing system can wait."""
@@ -251,7 +251,7 @@ def has_story(scenario: Scenario, name: str) -> bool:
 def story_values(scenario: Scenario, name: str, kind: str) -> dict[str, float]:
     """Return the values of a story that count for its grade and for the NPC's type.
 
-    What is nominal is left out, but for the grade.
+    Nominal values are left out, except the grade.
     """
     if not has_story(scenario, name):
         return {}

@@ -21,8 +21,8 @@ START_OFFSET_M = 30.0
 class Start:
     """Where the flight begins: motors off on the ground at home, or hovering near the marker.
 
-    ``height_m`` and ``offset_m`` (x, y, from the told coordinate) hold for ``hover`` only.  Raises
-    ScenarioError for another mode, or a place that cannot be flown from.
+    ``height_m`` and ``offset_m`` (x, y, from the mission's coordinate) hold for ``hover`` only.
+    Raises ScenarioError for another mode, or a place that cannot be flown from.
     """
 
     mode: StartMode = "ground"

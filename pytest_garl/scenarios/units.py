@@ -54,7 +54,7 @@ def snapped(scenario: Scenario, map: Map) -> Scenario:
 def sections_of(scenario: Scenario, map: Map) -> dict[str, dict[str, float]]:
     """Return the scenario's values as files write them: section, name, value in the name's unit.
 
-    What is nominal is left out, but for the marker's place and the NPCs that are there.
+    Nominal values are left out, except the marker's place and the NPCs that are there.
     """
     sections: dict[str, dict[str, float]] = {"weather": {}, "light": {}}
     for gene, weather in WEATHER.items():

@@ -38,9 +38,9 @@ from pytest_garl.search.model import MOST_FLIGHTS
 
 FORMAT, VERSION = "pytest-garl-archive", 1
 LEAST_OF_A_KIND = 5
-"""So many flights of each kind of violation are kept, however many came later."""
+"""This many flights of each kind of violation are kept, however many came later."""
 MOST_SUSPECTS = 20
-"""A search flies at most so many scenarios again that failed elsewhere."""
+"""A search flies again at most this many scenarios that failed elsewhere."""
 SHOWN_DIGITS = 12
 LARGEST_FILE, LARGEST_TEXT = 64_000_000, 512_000_000
 """Most bytes of the file, and of its text: a flight has some 3 kB of it."""

@@ -58,12 +58,12 @@ POPULATION, GENERATIONS = 60, 8
 MUTATION_SHARE = 0.9
 """Share of children with a gene that neither parent has."""
 OPTIMISM = 0.5
-"""The objectives of the model are what it thinks possible: so many standard deviations nearer."""
+"""The objectives are what the model thinks possible: this many standard deviations nearer."""
 TRIES = 20
-"""A child is tried so often, before a generation stays small: parents may have too few genes."""
+"""Tries for a child before a generation stays small: parents may have too few genes."""
 NOBODY = -1
 DRAWN = 8
-"""So many values of each gene are drawn for a generation; children that mutate take one of them."""
+"""Values of each gene that are drawn for a generation; children that mutate take one of them."""
 NPC_SHARE = 0.67
 """Share of added genes that are an NPC, in rows that may have one more."""
 UNSEEN_WORTH = 0.3
@@ -140,7 +140,7 @@ class Evolution:
         self._npcs = frozenset(n for n, gene in self._optional.items() if gene.is_npc)
         self._is_sparse = bool(columns.optional) and not columns.genome.is_dense
         self._crossed = tuple(self._optional if self._is_sparse else numbers.values())
-        """The nuclear genes by which a child is told to have parents."""
+        """The nuclear genes that show a child's parents."""
         self._flown = self._of_flights(flown)
         self._drawn = exploration.drawn(flown[-1], rng, DRAWN)
 

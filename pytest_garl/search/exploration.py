@@ -18,7 +18,7 @@ from pytest_garl.search.columns import CARELESS, NOBODY, Columns, OptionalGene
 from pytest_garl.search.operators import Matrix
 
 LONE_NPC_SHARE = 0.8
-"""Share of scenarios with NPCs that have one: it says more than two, and severity counts it."""
+"""Of scenarios with NPCs, this share has one: one says more than two, and severity counts it."""
 SLACK = 2.0
 """Times that a gene may have acted more often than another and still be chosen before it, so that
 which genes act together is random."""
@@ -27,9 +27,9 @@ EVENT_PAIR_SHARE = 1 / 3
 when another comes.  Most failures of distributed systems take two or three events, few take more
 (Yuan et al., Simple Testing Can Prevent Most Critical Failures, OSDI 2014)."""
 COINCIDENT_SHARE = 0.5
-"""Share of the events in a scenario with an earlier one that begin while that one lasts."""
+"""Share of the events beside an earlier one that begin while the earlier one lasts."""
 AFTER_MOMENT_S = 5.0
-"""An event that waits for a moment of the landing begins at most so long after it: each moment is
+"""An event that waits for a moment of the landing begins at most this long after it: each moment is
 followed by the next one within seconds (a descent from 8 m to 3 m takes some 5 s)."""
 
 
@@ -41,8 +41,8 @@ class Exploration:
     """
 
     draws = 8
-    """How many values are drawn for a condition; the most extreme one is flown.  That of a decoy is
-    the nearest to the UAV's way."""
+    """How many values are drawn for a condition; the most extreme one is flown.  For a decoy it is
+    the one nearest to the UAV's way."""
 
     def __init__(self, columns: Columns, map: Map) -> None:
         self._columns, self._map = columns, map
@@ -81,7 +81,7 @@ class Exploration:
     def drawn(
         self, row: Matrix, rng: np.random.Generator, count: int
     ) -> Mapping[str, Sequence[Matrix]]:
-        """Return so many values of each optional gene, each as ``values`` draws them."""
+        """Return ``count`` values of each optional gene, drawn as ``values`` draws them."""
         columns, names = self._columns, [gene.name for gene in self._columns.optional]
         found: dict[str, list[Matrix]] = {name: [] for name in names}
         for _ in range(count if names else 0):

@@ -38,7 +38,7 @@ PROPERTIES: tuple[MarginName, ...] = tuple(SAFE_MARGINS)
 VIOLATED, FARTHEST = 1.2, -0.5
 """The proximity of a violated property, and the least one: wider margins are alike."""
 MOST_FLIGHTS = 500
-"""The model is fitted to the latest flights, at most so many: its time grows with their cube."""
+"""The model is fitted to at most this many latest flights: its time grows with their cube."""
 ACTS = 0.2
 """Share of a gene's covariance that is due to its acting, whatever its values are."""
 PAIRS = 0.25

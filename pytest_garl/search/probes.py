@@ -40,7 +40,7 @@ from pytest_garl.verdicts.wording import compass_point, headline
 SEED = 1
 """Seed of all probes: of the noise of the sensors, which their twin has too."""
 GONE_S = 60.0
-"""For so long a marker is gone: the longest cover that a scenario can have."""
+"""A marker is gone for this time: the longest cover that a scenario can have."""
 BACK_AFTER_S = 3.0
 """ArduPilot's AC_PrecLand loses a landing target after 2 s, PX4 (PLD_BTOUT) after 5 s."""
 BESIDE_M = 4.0
@@ -54,7 +54,7 @@ HEIGHTS = 10
 FAR_M = 2.0
 """Of a marker that is nearer when it is first readable there is no half way."""
 EARLIER_S = 1.0
-"""Half way comes so much before half height, or both are one moment."""
+"""Half way comes this much before half height, or both are one moment."""
 FARTHEST_VIEW, NEAREST_VIEW = 0.8, 0.2
 """A marker is readable low only if it is not from this share of the height on, but from the other.
 """
@@ -131,7 +131,7 @@ def start_beside(clear: Scenario, map: Map, domain: Domain) -> Probe:
 def _away_m(scenario: Scenario, domain: Domain) -> float:
     """Return how far from the marker a flight starts or arrives.
 
-    In a domain of surveyed pads that is no farther than the told coordinate errs there.
+    In a domain of surveyed pads that is at most the error of the mission's coordinate there.
     """
     _, farthest = domain.range_of("told.error_m") or (0.0, 0.0)
     return min(BESIDE_M, farthest) if scenario["told.surveyed"] >= 0.5 else BESIDE_M
@@ -231,7 +231,7 @@ def _other_markers(twin: Flight, clear: Scenario, map: Map, limits: Limits) -> _
     sentence = f"three other markers of the dictionary lie around the marker, {away_m:g} m away"
     yield "other-markers", sentence, values, False
     sentence = f"a copy of the marker without its white margin lies {away_m:g} m beside it"
-    # It lies farther from the told coordinate than the marker; to trust neither is right, too.
+    # It lies farther from the mission's coordinate than the marker; to trust neither is right, too.
     yield "marker-twice", sentence, _decoy(1, "same-id-without-margin", places[1]), True
 
 

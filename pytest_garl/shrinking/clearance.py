@@ -20,9 +20,9 @@ from pytest_garl.simulation.physics.world import World
 KEPT_M = 0.3
 """Distance that an escape keeps between the UAV's hull and everything else, the ground included."""
 REACHED_AFTER_S = 1.0
-"""A UAV that is nearer than that when the escape begins has so long to get clear."""
+"""A UAV that is nearer when the escape begins has this time to get clear."""
 CLOSER_M = 0.02
-"""Until then it may come so much nearer than it was: what a tilted hull reaches out further."""
+"""Until then it may come nearer by this distance, because a tilted hull reaches farther."""
 LAST_TILT_RAD = math.radians(45)
 """A UAV that is tilted further in the end does not hover: the flight control's limit is 25°."""
 GROUND = "ground"

@@ -12,11 +12,11 @@ from pytest_garl.simulation.physics.vehicle import Vector
 from pytest_garl.simulation.system_under_test.takeover import Leg
 
 HOVERS_S = 3.0
-"""An escape holds until so long after the time of the contact."""
+"""An escape holds until this time after the contact."""
 GONE_S = 1.0
-"""The UAV flies on until so long after the time of the contact, then it hovers."""
+"""The UAV flies on until this time after the contact, then it hovers."""
 FIRST_LEG_S = 1.0
-"""An escape in two parts goes aside for so long, then up."""
+"""An escape in two parts goes aside for this time, then up."""
 ASIDE_MPS = 8.0
 """Speed aside: as fast as the fastest body, a bird.  In the time of an escape the acceleration
 limits the UAV, not this speed."""

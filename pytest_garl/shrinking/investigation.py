@@ -53,7 +53,7 @@ class CaseBuilder:
         scenarios = request.scenarios
         if not scenarios:
             return flights.result(None, NOT_REPRODUCED)
-        # What the landing system never read is no cause, and to drop it takes no flight.
+        # Data that the landing system never read is no cause; dropping it takes no flight.
         first = [flights.without_idle(each) for each in scenarios[:CANDIDATES]]
         scenarios = [*first, *scenarios[CANDIDATES:]]
         if request.is_exception:

@@ -29,7 +29,7 @@ from pytest_garl.verdicts.verdict import Verdict
 def case_without_flights(request: CaseRequest) -> CaseResult:
     """Return the simplest violation of the search as a case, without another flight.
 
-    What had gone wrong before a flight's end is no case until another flight shows it.
+    A finding, which went wrong before a flight's end, is no case until another flight shows it.
     """
     if request.finding:
         return CaseResult(

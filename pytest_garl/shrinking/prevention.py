@@ -48,10 +48,10 @@ from pytest_garl.simulation.system_under_test.takeover import Leg, Pilot, Takeov
 from pytest_garl.verdicts.evidence import Evidence
 
 STEADY_S = 1.0
-"""From so long after its touchdown on a UAV that is still on the ground may stop its motors: the
+"""From this time after its touchdown on, a UAV that is still on the ground may stop its motors: the
 land detector waits for the same second."""
 EXTRA_S = 0.5
-"""The flight of an escape goes on so long after it is judged."""
+"""The flight of an escape goes on for this time after it is judged."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,7 +198,7 @@ Fly = Callable[[FlightJob], CompletedFlight]
 def prevention_of(collision: Collision, fly: Fly, flights: int) -> Prevention:
     """Return whether a collision could have been prevented; fly at most ``flights`` flights.
 
-    If no planned escape is confirmed within these flights, it is as if it had not been asked.
+    If no planned escape is confirmed within these flights, it returns ``NOT_ASKED``.
     """
     with collision.world() as world:
         return _Question(collision, world, fly, flights).answer()
@@ -235,7 +235,7 @@ class _Question:
                 escape="motors off",
             )
         ready_s = 0.0 if seen_s is None else contact_s - seen_s - REACTION_S
-        # Whoever has an escape later can also wait for it.
+        # A UAV that has an escape later can also wait for it.
         in_time = ready_s >= latest_s or (ready_s > 0 and self._escapes(ready_s))
         return Prevention(
             answer="preventable" if in_time else "sensor-limited",

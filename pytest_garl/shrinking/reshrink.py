@@ -245,7 +245,7 @@ class CaseReshrinker:
         """Return a failure as the case that replaces the saved one."""
         case, untried = self._case, self._flights.untried(failing)
         if case.is_shrunk:
-            # What was tried when it was saved need not be tried again.
+            # Steps that were tried when it was saved need not be tried again.
             untried = tuple(name for name in untried if name in case.severity.untried)
         found = new_case(self._flights.request, failing, prevention, untried)
         removed = all_removed(case.evidence.removed, found.evidence.removed)

@@ -70,8 +70,8 @@ def shrink(
 def reset_and_bisect(trials: Trials, colliding_object: str) -> None:
     """Reset as much as the failure survives, in the largest pieces; bisect the rest.
 
-    Whoever was hit may be enough for a failure.  Any other one needs a condition, or it is found
-    out at the end of a bisection that it needs none.
+    The object that was hit may be enough for a failure.  A failure without such an object
+    needs a condition; if it needs none, the end of a bisection shows it.
     """
     steps = simplifications(trials.best, trials.genome, colliding_object)
     is_hit = bool(colliding_object)
@@ -124,7 +124,7 @@ def _bisect(trials: Trials) -> None:
             continue
         least, most = 0.0, 1.0
         for step in range(BISECTIONS):
-            # What survives two halvings may need nothing of it.
+            # A failure that survives two halvings may not need the value at all.
             if step == BISECTIONS - 1 and least == 0 and trials(_nearer(start, moved, 0.0)):
                 break
             share = (least + most) / 2

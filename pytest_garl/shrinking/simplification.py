@@ -61,8 +61,8 @@ def removals(
 ) -> dict[str, list[Simplification]]:
     """Return how to remove each object, and how to make each condition nominal, by name.
 
-    A condition may have several genes.  Whoever was hit is not named, and the marker's place only
-    if nobody was.
+    A condition may have several genes.  The object that was hit is not named, and the marker's
+    place only if no object was hit.
     """
     found: dict[str, list[Simplification]] = {}
     for key, _ in scenario.genes:

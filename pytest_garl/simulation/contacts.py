@@ -16,7 +16,7 @@ AIRBORNE_M = 1.0
 ABORT_CLEAR_M = 2.0
 ABORT_HEIGHT_M = 5.0
 SETTLING_S = 5.0
-"""A UAV that touched down before the time limit may fly on for so long: 1.4 s until the motors stop
+"""A UAV that touched down before the time limit may fly on for this time: 1.4 s until motors stop
 and 2 s in which it is watched, with half as much in reserve."""
 CLEAR_OF_CONTACT_M = 2.0
 """A body this far away cannot be touched before the next sample of the track, so the engine is not
@@ -67,7 +67,7 @@ class Contacts:
     def record_pose(self, time_s: float) -> None:
         """Add a sample to the tracks, with the distance to every body.
 
-        After the motors stopped, who comes near is no matter of the landing system.
+        After the motors stopped, an approaching body is no matter of the landing system.
         """
         position, attitude, velocity, _ = self._world.uav_state()
         gaps = self._world.separations()

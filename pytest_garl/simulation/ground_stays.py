@@ -20,8 +20,8 @@ BOUNCE_S = 0.25
 a hard touchdown, is in the air for 0.2 s."""
 STILL_MPS = 0.2
 WATCHED_S = 2.0
-"""The flight goes on for so long after the motors stopped, or after a slide exceeded its limit, so
-that the record shows whether the UAV still moves."""
+"""The flight goes on for this time after the motors stopped, or after a slide exceeded its limit:
+so the record shows whether the UAV still moves."""
 
 
 class GroundStays:

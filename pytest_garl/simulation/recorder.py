@@ -155,7 +155,7 @@ class Recorder:
     ) -> None:
         """Record one command of the landing system, with what its frame shows.
 
-        ``error_m`` is the error of the position that the system was told, ``range_m`` the reading
+        ``error_m`` is the error of the position that the system got, ``range_m`` the reading
         of its rangefinder.
         """
         self.moments.see(self.time_s, sight.marker)

@@ -34,7 +34,7 @@ from pytest_garl.triage.known_kinds import Twin, are_alike, request_twin
 from pytest_garl.triage.new_signatures import NewSignatures, named, request_of
 
 MOST_CAUSES = 4
-"""A search looks for so many causes of one ending at most; the next search looks further."""
+"""A search looks for at most this many causes of one ending; the next search looks further."""
 Kind = tuple[str, str]
 """The key of a search and an ending."""
 

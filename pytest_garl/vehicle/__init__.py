@@ -26,7 +26,7 @@ headings counter-clockwise from east, where ArduPilot has north, east, down.
     thrusts = control.control(state)         # at the control rate, from the first moment on
 
 Orders act at the next control step.  A landing system whose airframe declares a ``latency_s``
-holds its own orders back for so long, since the simulator delays commands only.
+holds its own orders back for that long, since the simulator delays commands only.
 """
 
 from pytest_garl.vehicle.controller import ArduPilotControl, Mode

@@ -52,13 +52,13 @@ MODES: Mapping[str, int] = {
 """The modes by their number in HEARTBEAT."""
 HOLDING = ("STABILIZE", "ALT_HOLD", "LOITER", "POSHOLD", "BRAKE")
 FACE_BEYOND_M = 2.0
-"""The nose turns towards a goal that is at least so far away, as with ``WP_YAW_BEHAVIOR`` 1, 2."""
+"""The nose turns towards a goal at least this far away, as with ``WP_YAW_BEHAVIOR`` 1, 2."""
 MARKER_WITHIN_M = 7.5
-"""So far from ``Mission.gps_position_m`` the marker lies at most."""
+"""Largest distance of the marker from ``Mission.gps_position_m``."""
 RATE_TIMEOUT_S = 3.0
 """A yaw rate that is not renewed ends, as a velocity does."""
 NEAR_M, STILL_S = 1.0, 3.0
-"""The pilot changes the mode when the vehicle was so near to the coordinate for so long."""
+"""The pilot changes the mode when the vehicle was this near to the coordinate for this time."""
 Pilot = Literal["", "LAND", "LOITER"]
 
 
@@ -68,8 +68,8 @@ class ArduCopter:
 
     ``parameters`` are ArduPilot's, by name and in its units (``{"PLND_ENABLED": 1, "LAND_SPEED":
     30}``).  ``pilot`` is the mode into which a human pilot switches: with "LAND" the pilot takes
-    off, flies to the told coordinate at the search altitude, waits there and switches, for programs
-    that only help ArduPilot to land; by default the program does all of it.
+    off, flies to the mission's coordinate at the search altitude, waits there and switches, for
+    programs that only help ArduPilot to land; by default the program does all of it.
     """
 
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -145,7 +145,7 @@ class Autopilot:
         self._turn: tuple[float, float] = (0.0, 0.0)
         self._return: Callable[[VehicleState], None] | None = None
         self.returns_since_s: float | None = None
-        """When it was told to return home; None in another mode."""
+        """When it got the command to return home; None in another mode."""
         self._is_home = False
         self._near_s: float | None = None
         self.told: list[str] = []
@@ -235,7 +235,7 @@ class Autopilot:
             p = self.parameters
             self._begin_return(p["RTL_ALT"] / 100, p["RTL_LOIT_TIME"] / 1000)
         elif self._control.flying:
-            # GUIDED holds the place until it is told one.
+            # GUIDED holds the place until it gets another one.
             self._hold()
         return True
 

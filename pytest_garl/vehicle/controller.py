@@ -107,8 +107,8 @@ class ArduPilotControl:
 
         A position alone is flown to and held; a position with a velocity moves on with it; a
         velocity alone is flown until ``GUID_TIMEOUT``.  ``speed`` bounds the speed on the way
-        (``WPNAV_SPEED`` and so on bound it anyway).  What is not given stays: the heading, and
-        the place if there is neither position nor velocity.  Ignored while the motors are off.
+        (``WPNAV_SPEED`` and so on bound it anyway).  Values that are not given stay: the heading,
+        and the place if there is neither position nor velocity.  Ignored while the motors are off.
         """
         if self.mode == "stopped":
             return

@@ -1,6 +1,6 @@
 """MAVLink bytes between a companion program and the autopilot, by pymavlink's dialect.
 
-What arrives is parsed, what the program asked for is answered, and the state is told at the rates
+Messages that arrive are parsed, requests are answered, and the state is sent at the rates
 of a stream.  The link knows no socket: bytes come in by ``receive`` and go out by ``send``.
 """
 
@@ -114,7 +114,7 @@ class MavlinkLink:
             self._mav.statustext_send(self._d.MAV_SEVERITY_INFO, text.encode()[:50])
         self._autopilot.told.clear()
 
-    # What is told.
+    # Messages to the program.
 
     def _tell(self, name: str) -> None:
         getattr(self, f"_tell_{name.lower()}")()
@@ -218,7 +218,7 @@ class MavlinkLink:
             measured = round(100 * self.rangefinder_m)
             self._mav.distance_sensor_send(self._ms, 0, 12_000, measured, laser, 0, down, 0)
 
-    # What the program says.
+    # Messages from the program.
 
     def _on_command_long(self, m: Any) -> None:
         values = (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7)
@@ -471,7 +471,7 @@ class MavlinkLink:
 
 
 _OF_STREAM = tuple(name for name, hz in STREAMS.items() if hz >= 5)
-"""What any of the old streams carries: which of them is not told apart."""
+"""What any of the old streams carries: they are not distinguished."""
 
 
 def _plus(a: Vector, b: Vector) -> Vector:

@@ -45,7 +45,7 @@ class Parameters:
     """All parameters of one vehicle; ``flown`` are those of the flight control.
 
     A gain acts from the next start on, a speed or what concerns landing at once, as the flight
-    control reads it.  A name that nothing here reads is kept and told, as ArduPilot keeps it.
+    control reads it.  A name that nothing here reads is kept and reported, as ArduPilot keeps it.
     """
 
     def __init__(self, hover_throttle: float, changes: Mapping[str, float]) -> None:

@@ -71,7 +71,7 @@ class ArduPilotParameters:
     wpnav_accel_z: float = 1.0
     """m/s²; 250 and 100 cm/s²."""
     guid_timeout: float = 3.0
-    """s: a velocity that is not renewed for so long is taken back."""
+    """s: a velocity that is not renewed for this time is taken back."""
 
     angle_max: float = math.radians(30)
     """3000 centidegrees."""

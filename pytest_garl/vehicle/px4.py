@@ -75,7 +75,7 @@ class Px4Copter:
     """The vehicle of a companion program: PX4's modes over ArduPilot's flight control.
 
     ``parameters`` are PX4's (``{"COM_OBL_RC_ACT": 4}``).  ``pilot`` is the mode into which a human
-    pilot switches after a take-off and a flight to the told coordinate: "LAND" stands for
+    pilot switches after a take-off and a flight to the mission's coordinate: "LAND" stands for
     AUTO.PRECLAND.
     """
 

@@ -15,7 +15,7 @@ from pytest_garl.verdicts.wording import headline
 
 NEVER_OFF = "it never left the ground"
 STAY_M, STAY_S = 0.5, 5.0
-"""A UAV that moved no farther from its last place in so long a time stayed there."""
+"""A UAV that was this near to its last place for this time stayed there."""
 
 
 def why_no_landing(evidence: Evidence, verdict: Verdict) -> str:

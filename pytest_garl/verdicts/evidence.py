@@ -30,7 +30,7 @@ LAST_METRE_M = 1.2
 NEAR_MARKER_M = 2.5
 """Horizontal distance from the marker within which a high UAV is on approach."""
 LOW_M = 7.0
-"""Height at which a take-off ends at the latest; whoever comes down below it is on the descent."""
+"""Height at which a take-off ends at the latest; a UAV that sinks below it is in its descent."""
 SUNK_M = 0.5
 """A UAV that is this far below its highest place so far has turned to come down; less is bobbing.
 NPCs wait for the same difference (``landing_moments.DESCENT_HYSTERESIS_M``)."""

@@ -52,7 +52,7 @@ def verdict_on(evidence: Evidence) -> Verdict:
     elsewhere = descent_elsewhere(evidence)
     mechanism = mechanism_of(evidence, why, why_text, elsewhere)
     if must_give_up(evidence):
-        # What excuses giving up does not excuse waiting until the time is up.
+        # An excuse for giving up does not excuse waiting until the time is up.
         why, why_text = "", ""
     far = flight.final_distance_m > PAPER_LIMITS.distance_m
     came_down = flight.outcome in ("landed", "slid")

@@ -1,7 +1,7 @@
 """Count kinds of violation at equal effort: Hill numbers and rarefaction.
 
-A kind is the signature of a violation.  Whoever flies more finds more kinds, and whoever finds more
-violations does too, so that bare counts of unequal searches say little.  Every figure here is of
+A kind is the signature of a violation.  More flights show more kinds, and so do more
+violations, so that bare counts of unequal searches say little.  Every figure here is of
 the flights that were flown.  None estimates the kinds that nobody has seen: such estimates want a
 random sample, and a search that learns draws none.
 """
@@ -21,10 +21,10 @@ LEVEL = 0.95
 def hill_number(counts: Sequence[int], order: float) -> float:
     """Return the effective number of kinds (Hill 1973, Ecology 54(2), 427-432).
 
-    ``counts`` are the violations of each kind.  So many equally frequent kinds would be as diverse.
-    Order 0 counts all kinds alike, order 1 is the exponential of Shannon's entropy, order 2 the
-    inverse of Simpson's index and hardly counts rare kinds.  It is the plug-in value, without a
-    correction for unseen kinds, and 0 without violations.
+    ``counts`` are the violations of each kind.  This many equally frequent kinds would be as
+    diverse.  Order 0 counts all kinds alike, order 1 is the exponential of Shannon's entropy, order
+    2 the inverse of Simpson's index and hardly counts rare kinds.  It is the plug-in value, without
+    a correction for unseen kinds, and 0 without violations.
     """
     found = np.array([count for count in counts if count], dtype=float)
     if not found.size:
@@ -36,7 +36,7 @@ def hill_number(counts: Sequence[int], order: float) -> float:
 
 
 def kinds_in_violations(counts: Sequence[int], violations: int) -> float:
-    """Return how many kinds so many of the violations show on average, drawn at random.
+    """Return how many kinds a number of violations shows on average, if drawn at random.
 
     Rarefaction by individuals (Hurlbert 1971, Ecology 52(4), 577-586).  Raises ValueError if more
     are to be drawn than there are.

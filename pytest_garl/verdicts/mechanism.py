@@ -24,11 +24,11 @@ from pytest_garl.verdicts.verdict import (
 LOST_AFTER_S = 3.0
 """A marker counts as lost if it was not readable for this long before the end."""
 RECENT_S = 0.5
-"""A marker that was in view so long ago is in view."""
+"""A marker that was in view at most this long ago counts as in view."""
 LAST_S = 60.0
-"""Of this time before the end it is told how often the marker could be read."""
+"""The text says how often the marker could be read in this time before the end."""
 ALL_SHARE = 0.95
-"""A marker that could be read in so many pictures was in view to the end."""
+"""A marker that could be read in this share of the pictures was in view to the end."""
 RESERVE_SHARE = 0.15
 """A landing that is given up in this last share of the time limit is given up for want of time."""
 UNRANGED_S = 1.0

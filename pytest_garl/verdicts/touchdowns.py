@@ -25,7 +25,7 @@ HOP_M = HARD_TOUCHDOWN_MPS**2 / (2 * GRAVITY_MPS2)
 """A UAV whose feet stay below this height, 0.2 m, has not taken off again: motors that stop there
 let it fall without a hard touchdown."""
 STANDS_S = 1.5
-"""From so long after its touchdown on a UAV stands with running motors.  Those of a UAV that lands
+"""From this time after its touchdown on, a UAV stands with running motors.  When a UAV lands, they
 stop within 1.4 s (see ``contacts.SETTLING_S``)."""
 LEFT_M = 0.1
 """A UAV that is farther than this from where it touched down has begun to move over the ground."""
@@ -64,7 +64,7 @@ class Stay:
         return self.touchdowns[-1].stopped_s
 
     def stands_at(self, time_s: float) -> bool:
-        """Whether the UAV stands at a time, for so long that its motors ought to have stopped."""
+        """Whether the UAV stands at a time, after its motors ought to have stopped."""
         ended = self.end_s is not None and time_s > self.end_s
         stopped = self.stopped_s is not None and time_s >= self.stopped_s
         return time_s - self.since_s >= STANDS_S and not ended and not stopped

@@ -52,7 +52,7 @@ def headline(description: str) -> str:
             where = where.rpartition(", ")[0]
     what = what.partition("\n")[0].removesuffix(".")
     if what.startswith(("Python", _CRASH)):
-        # What was raised may end in any words, which the place must not seem to go on with.
+        # An exception's text may end in any words; the place must not seem to continue them.
         place = f" ({where.removeprefix(', ')})" if where else ""
         return f"{what[:1].lower() if what.startswith(_CRASH) else 'P'}{what[1:]}{place}"
     # The place is that of what happened, not of what had been before.

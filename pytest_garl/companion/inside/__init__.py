@@ -6,8 +6,8 @@ installed: nothing here imports it.  ``start.py`` loads this package under a nam
 Simulated time, in steps:
 
 1. Each thread of the program is a task (``turns.py``).  A real thread carries it, and one of them
-   runs at a time: whoever sleeps, waits for a lock or reads an empty socket parks, and gives the
-   turn to the task that is due first; tasks due at one time run in the order in which they parked.
+   runs at a time: a task that sleeps, waits for a lock or reads an empty socket parks, and gives
+   the turn to the task that is due first; tasks due at one time run in the order of their parking.
    No task is interrupted: a computation takes no time of the flight.
 2. The clock stands while a task computes.  Each reading of it adds 20 microseconds, so that loops
    that wait for a time end, and no program divides by 0.

@@ -38,7 +38,7 @@ _MODES = {
 
 
 class Server:
-    """The link to the vehicle in a thread of its own: it repeats setpoints, whoever computes."""
+    """The link to the vehicle in its own thread: it repeats setpoints while others compute."""
 
     def __init__(self, package: str) -> None:
         self._package = package
@@ -241,7 +241,7 @@ class Offboard(Plugin):
     async def start(self) -> None:
         if self._server.setpoint is None:
             raise self._server.error("offboard", "start", "NO_SETPOINT_SET")
-        # The vehicle has heard the stream when it is told to enter the mode.
+        # The vehicle has received the stream when it gets the command to enter the mode.
         await asyncio.sleep(2 * STREAM_S)
         await self._server.set_mode("offboard", "start", (OFFBOARD, 0), GUIDED)
 

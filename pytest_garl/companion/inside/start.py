@@ -149,7 +149,7 @@ class Host:
         self._wire.write(b"D", struct.pack("!I", len(text)) + text + sent)
 
     def wait_for_the_end(self) -> None:
-        """Read until the simulator closes the link: what was told last may not be read yet."""
+        """Read until the simulator closes the link: the last message may not be read yet."""
         while True:
             self._read()
 
@@ -280,7 +280,7 @@ def run(arguments: list[str]) -> None:
 
 
 def failure_of(error: BaseException) -> dict[str, Any]:
-    """Return what is told of an error that ended the program."""
+    """Return what is reported of an error that ended the program."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [each for each in frames if not _is_carrier(each.filename)]
     last = own[-1] if own else None

@@ -119,7 +119,7 @@ class Turns:
         heapq.heappush(self._due, (time_s, self._count, task.token, task))
 
     def _next(self) -> Task:
-        # Whoever parked last may be roused too, by what ``more`` brings.
+        # The task that parked last may be roused too, by what ``more`` brings.
         self.current = self._nobody
         while True:
             while self._due and self._due[0][0] <= self.until_s:

@@ -44,7 +44,7 @@ from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Situation
 NEVER_S = STORY["delay_s"].quantity.high
 """An NPC that begins then never does in a landing of the surrogate."""
 EARLY_S = 1 / 120
-"""The situation before a decision is a tick old: so much earlier a moment is set."""
+"""The situation before a decision is a tick old, so a moment is set earlier by this."""
 STRIDE = 2
 """Moments are a second apart, every second decision."""
 Meeting = tuple[float | None, float | None, float]

@@ -33,9 +33,9 @@ from pytest_garl.scenarios.validity import repair
 START_HEIGHTS_M = (3.0, 11.0)
 START_OFFSET_M = 4.0
 LATEST_COMING_S = 8.0
-"""An NPC comes at most so long after the start: a descent from 11 m takes 10 to 20 s."""
+"""An NPC comes at most this long after the start: a descent from 11 m takes 10 to 20 s."""
 BEYOND_SIGHT_M = 2.0
-"""An NPC starts at most so much farther from the marker than it sees."""
+"""An NPC starts at most this much farther from the marker than it sees."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -30,7 +30,7 @@ class Landing:
 
     Reading a property that the flight did not decide skips the test with the reason;
     ``final_distance_m`` and ``elapsed_s`` can always be read.  ``reads`` is what ``test`` has read
-    so far, so that a failure can be told from another property's.  ``is_shown_elsewhere`` says
+    so far, to distinguish a failure from another property's.  ``is_shown_elsewhere`` says
     whether another test of the slot fails for the flight's violation.
     """
 

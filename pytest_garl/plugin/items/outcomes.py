@@ -183,7 +183,7 @@ def decide(facts: Facts) -> Decision | Need:
 def _unjudged_flight(facts: UnjudgedFlight) -> Decision | Need:
     """Let one test of the slot fail and the others skip.
 
-    What a search could not decide is counted for all its flights together.  A test that is expected
+    Undecided flights are counted for a whole search.  A test that is expected
     to fail reports nothing, so another one must.
     """
     if facts.inconclusive and not facts.alone:

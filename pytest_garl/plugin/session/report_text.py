@@ -146,7 +146,7 @@ def case_text(
     if decision.reason is Reason.FAILS_DIFFERENTLY and not case.assertion:
         take = command("garl", "cases", "shrink", "--as-it-fails", file)
         lines.append(f"If it is no worse than before, make it a case of that: {take}")
-    # What happened comes first because pytest cuts the line at its end.
+    # The event comes first because pytest cuts the line at its end.
     return FailureText(
         lines=tuple(lines), headline=f"{headline(story)}; this case {state}", command=replay
     )

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from pytest_garl.triage.investigation_queue import Investigations
 
 REFLIGHTS = 4
-"""A violation of a system that need not be deterministic is flown so many times more."""
+"""A violation of a system that need not be deterministic is flown this many times more."""
 NOTHING_KNOWN = KnownCaseMatch(known=None)
 FilmKey = tuple[str, ...]
 """What a film shows: (name of its search, signature) of a kind, or (name,) of a saved case."""

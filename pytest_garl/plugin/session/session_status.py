@@ -21,7 +21,7 @@ from pytest_garl.plugin.terminal_text import counted, listed
 from pytest_garl.reports.run_record import SearchRecord
 
 FLIGHTS_PER_EXCEPTION = 20
-"""One in so many flights of a search may be inconclusive, and one may fail without repeating it."""
+"""One in this many flights may be inconclusive, and one in as many may fail only once."""
 _ASK_FOR_FLIGHTS = ("budget", "map", "repeat")
 """Options of the command line that ask a session for flights, whatever its tests are."""
 MESSAGE_CHARS = 300

@@ -144,7 +144,7 @@ def _workers(run: Run) -> str:
 
 
 def _duration_of(run: Run, flight_s: float, searches: Sequence[int]) -> str:
-    """Return how long searches of so many flights take, with all that the default cap allows."""
+    """Return how long searches of these sizes take, with all that the default cap allows."""
     options = run.options
     each = options.shrink if options.shrink_capped else 0
     workers = max(1, options.workers or 1)

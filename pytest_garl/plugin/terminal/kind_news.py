@@ -17,9 +17,9 @@ from pytest_garl.shrinking.case_request import CaseRequest, CaseResult
 from pytest_garl.verdicts.wording import headline
 
 PERIOD_S = 1.0
-"""The ledger is read so often: a flight takes longer."""
+"""The ledger is read at this interval: a flight takes longer."""
 _NEWS = pytest.StashKey["KindNews"]()
-"""Where a session keeps which new kinds were told."""
+"""Where a session keeps which new kinds were announced."""
 
 
 class KindNews:
@@ -102,7 +102,7 @@ def news_of(run: Run, config: pytest.Config) -> KindNews:
 
 
 def write_last_news(run: Run, config: pytest.Config) -> None:
-    """Write the sentences that are still due, in a session that has told any."""
+    """Write the sentences that are still due, in a session that has announced any."""
     if _NEWS in config.stash:
         config.stash[_NEWS].write(run.ledger, at_once=True)
 
@@ -117,6 +117,6 @@ def _shrunk(request: CaseRequest, result: CaseResult) -> str:
     if result.case.is_shrunk:
         return f"garl: shrunk {name}: {sentences[0]}"
     if result.case.severity.is_guess:
-        # What was unusual stands first, and nobody knows which of it the violation takes.
+        # Unusual values stand first; it is unknown which of them the violation takes.
         return f"garl: confirmed, not shrunk {name}: {'. '.join(sentences[:2])}".removesuffix(".")
     return f"garl: confirmed {name}: {sentences[0]}"

@@ -1,4 +1,4 @@
-"""The pages of a run, written when pytest has told its findings: ``--garl-report=DIR``."""
+"""The pages of a run, written when pytest has reported its findings: ``--garl-report=DIR``."""
 
 from __future__ import annotations
 

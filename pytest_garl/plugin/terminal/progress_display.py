@@ -25,7 +25,7 @@ from pytest_garl.plugin.xdist import is_xdist_worker
 
 REFRESH_S = 0.5
 LOG_PERIOD_S = 30.0
-"""Without a terminal a line is written so often: enough to see that the run is alive."""
+"""Without a terminal a line is written at this interval: enough to see that the run is alive."""
 
 
 @contextmanager

@@ -153,7 +153,7 @@ class ProgressReader:
             shrinks=self._run.options.shrink > 0,
             investigated=investigations.running if investigations else 0,
         )
-        # What is expected grows with each new kind; the bar does not go back.
+        # The expected number grows with each new kind; the bar does not go back.
         self._share = max(self._share, progress.share)
         return dataclasses.replace(
             progress, least_share=self._share, flights_per_s=self._rate(progress.flown, now)

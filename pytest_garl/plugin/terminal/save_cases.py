@@ -94,7 +94,7 @@ def _announcement(
 ) -> str:
     """Return how much is left to confirm and shrink; ``run.remaining`` keeps it.
 
-    What probes found is no new kind of the search, which may have found the same.
+    A kind that probes found is not new for the search, which may have found the same.
     """
     requests = (*found, *probed)
     work = investigations.remaining(requests, _flight_s(run, requests))

@@ -19,7 +19,7 @@ _QUALITY = 27
 TOP_KBPS = 350
 """Limits a video of 60 s to 2.6 MB in any weather."""
 _BUFFER_S = 4
-"""The encoder may exceed the limit for so long."""
+"""The encoder may exceed the limit for this time."""
 _PATIENCE_S = 30
 """An ffmpeg lists its encoders in a tenth of a second."""
 

@@ -72,12 +72,12 @@ def outcome_bar(search: SearchRecord) -> tuple[Segment, ...]:
 
 
 def kinds_over_flights(searches: Sequence[SearchRecord]) -> Plot | None:
-    """Return how many kinds of violation each search had found after so many flights."""
+    """Return how many kinds of violation each search had found after each number of flights."""
     return _plot(searches, [each.kinds_over_flights for each in searches])
 
 
 def violations_over_flights(searches: Sequence[SearchRecord]) -> Plot | None:
-    """Return how many flights of each search had violated something after so many flights."""
+    """Return how many violations each search had found after each number of flights."""
     return _plot(searches, [each.violations_over_flights for each in searches])
 
 

@@ -20,7 +20,7 @@ from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.verdict import Verdict
 
 AT_MARKER_M = 1.0
-"""A target within so much of the marker's centre is meant for the marker."""
+"""A target no farther than this from the marker's centre is meant for the marker."""
 FLYING_M = 0.5
 """Below this height of its feet a UAV has not taken off yet, or has landed."""
 MISSED = 0.5

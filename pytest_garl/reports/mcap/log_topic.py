@@ -68,7 +68,7 @@ def _happened(flight: Flight) -> Iterator[tuple[int, LogLevel, str, str]]:
     # Feet touch the ground in each landing; the last contact of a collision ended the flight.
     hit_s = flight.contacts[-1].time_s if flight.outcome == "collision" else None
     for event in flight.events:
-        # The system's phases are told with its notes below.
+        # The system's phases are logged with its notes below.
         if event.name != "phase":
             level = _LEVELS.get(event.name, LogLevel.Info)
             if event.name == "contact" and event.time_s == hit_s:

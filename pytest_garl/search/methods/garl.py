@@ -110,7 +110,7 @@ class Garl:
         self._generation = -1
         self._told: list[Sequence[FlownScenario]] = []
         self._learned = 0
-        """So many generations were learned from."""
+        """How many generations were learned from."""
         self._flown: list[FlownScenario] = []
         """The flights of these generations, in order; ``_rows`` are their chromosomes."""
         self._rows: list[Matrix] = []
@@ -196,7 +196,7 @@ class Garl:
         return max((worth / self._seen[signature] for signature, worth in shown), default=0.0)
 
     def _children(self, count: int) -> Iterator[tuple[Scenario, Origin]]:
-        """Yield so many children; fewer if the flights have too few conditions to cross."""
+        """Yield ``count`` children; fewer if the flights have too few conditions to cross."""
         if count == 0:
             return
         # pymoo takes a third of a second to import.

@@ -28,9 +28,9 @@ from pytest_garl.simulation.camera.weather import Conditions
 Array = NDArray[np.float32]
 _SHIFT = 4
 _LEAST_SEEN = 4
-"""So many places of white and of black must be seen for a contrast."""
+"""This many places of white and of black must be seen for a contrast."""
 _EDGE = 0.1
-"""The painted edges of modules are a pixel wide and turn so much of the places beside them."""
+"""The painted edges of modules are a pixel wide and change this share of the places beside them."""
 _MOSTLY = 0.25
 """A marker of which less is hidden can be read, if with errors."""
 _ROUND = 4

@@ -50,8 +50,8 @@ loop of the velocity, which follows the falling wanted speed 1 / VELOCITY_P seco
 ``test_flight_control.py`` measures that the UAV does not overshoot."""
 ABORT_CLIMB_MPS = 3.0
 STANDING_AFTER_S = 0.35
-"""PX4's documented time until ground contact counts, if a vehicle is told to descend and does not
-move vertically; from there on its position control takes the thrust away."""
+"""PX4's documented time until ground contact counts, if a vehicle is commanded to descend and does
+not move vertically; from there on its position control takes the thrust away."""
 DESCENDS_MPS = 0.1
 """A command that wants less does not mean to land: half of what a setpoint of the position at
 height 0 wants of a UAV on its feet."""

@@ -12,9 +12,9 @@ from pytest_garl.scenarios.story import APPROACH_S
 Vector = tuple[float, float, float]
 
 REACTION_S = 0.5
-"""It leaps at where the UAV was so long ago: the delay with which the grade that chases sees."""
+"""It leaps at where the UAV was this long ago: the delay with which a chasing NPC sees."""
 LEAPS_FROM_M = 1.0
-"""It leaps at a UAV that is at most so far to the side: engineering estimate, a length of its
+"""It leaps at a UAV that is at most this far to the side: engineering estimate, a length of its
 body."""
 
 

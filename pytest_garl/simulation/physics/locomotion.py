@@ -49,7 +49,7 @@ def next_course(
 
 
 def limit_mps(kind: ObjectType, reserve_m: float) -> float:
-    """Return the speed that a body can run while so much of its reserve is left.
+    """Return the speed that a body can run with what is left of its reserve.
 
     The reserve is the distance that it can still run beyond what it can keep up, its critical
     speed (Monod and Scherrer 1965, Hughson et al. 1984).

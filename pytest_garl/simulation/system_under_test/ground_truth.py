@@ -1,6 +1,6 @@
 """Ground truth for a reference pilot: the positions of the marker and of all objects.
 
-Only pilots of this package are told: a landing system must find the marker itself.  A method of
+Only pilots of this package get it: a landing system must find the marker itself.  A method of
 the same name in another class gets nothing.
 """
 
@@ -37,7 +37,7 @@ class Truth:
 
 
 class TruthPilot:
-    """Base of the pilots of this package that are told the truth before each step."""
+    """Base of the pilots of this package that get ground truth before each step."""
 
     def observe_truth(self, truth: Truth) -> None:
         """Take the truth of this moment."""
@@ -51,7 +51,7 @@ class PilotWrapper:
 
 
 def truth_pilot_of(system: Any) -> TruthPilot | None:
-    """Return the pilot that is told the truth, of a system or of what it wraps; None if none is."""
+    """Return the pilot that gets ground truth, in a system or in what it wraps, or None."""
     # By the type: a landing system may have a property ``__class__``.
     kind = type(system)
     if not issubclass(kind, TruthPilot | PilotWrapper) or not is_own(kind):

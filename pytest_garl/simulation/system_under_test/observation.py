@@ -45,7 +45,7 @@ class LazyObservation(Observation):
         raise AttributeError(f"Observation has no {name!r}; {hint}")
 
     def __reduce__(self) -> tuple[Callable[[], Observation], tuple[()]]:
-        """Give whoever copies or pickles it a plain observation."""
+        """Copy or pickle it as a plain observation."""
         values = {each.name: getattr(self, each.name) for each in dataclasses.fields(Observation)}
         return functools.partial(Observation, **values), ()
 
@@ -78,7 +78,7 @@ class LazyObservation(Observation):
     @rangefinder_m.setter
     def rangefinder_m(self, rangefinder_m: float | None) -> None:
         object.__setattr__(self, "_rangefinder_m", rangefinder_m)
-        # The constructor sets this field last; whoever copies an observation has read it all.
+        # The constructor sets this field last; copying an observation reads all of it.
         object.__setattr__(self, "_noted", set())
 
 
@@ -113,7 +113,7 @@ def observe(
 
 
 def estimation_error_m(observation: Observation, position_m: Vector) -> Vector:
-    """Return the difference between the position that a system is told and the true one."""
+    """Return the difference between the position that a system gets and the true one."""
     x, y, z = (float(value) for value in observation.position_m - np.array(position_m))
     return x, y, z
 

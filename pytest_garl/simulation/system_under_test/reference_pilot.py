@@ -22,13 +22,13 @@ from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthPi
 CRUISE_M = 10.0
 CRUISE_MPS = 4.0
 CENTRED_M = 0.10
-"""So near to the marker's centre the pilot ends its way across."""
+"""The pilot ends its way across at this distance from the marker's centre."""
 DESCENT_MPS = 1.0
 LOOK_AHEAD_S = 3.0
 CLEARANCE_M = 0.75
 """Half of the UAV and a quarter of a metre, beyond an object's own radius."""
 PATIENCE_S = 45.0
-"""The pilot waits so long above a marker that is not free, three times the time to come down: an
+"""The pilot waits this long above a marker that is not free, three times the time to come down: an
 object on the marker keeps any UAV from landing, but makes none collide."""
 ABORT_TAKES_S = 10.0
 

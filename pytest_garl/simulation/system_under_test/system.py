@@ -33,7 +33,7 @@ class SystemUnderTest:
     """The landing system of one flight.
 
     Every call may raise SystemFailedError, which ends the flight.
-    ``needs_camera`` and ``truth_pilot``, a pilot of this package that is told the truth, are known
+    ``needs_camera`` and ``truth_pilot``, a pilot of this package that gets ground truth, are known
     after ``start``.  ``has_stepped`` is whether ``step`` has returned a command, ``gave_up``
     whether the last one was ``Abort()``.
     """
