@@ -12,9 +12,19 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, get_args
 
-from pytest_garl.cases.case import Escape, NoGateReason, Preventable, Status
+from pytest_garl.cases.case import NoGateReason, Status
 from pytest_garl.cases.case_header import SCHEMA as CASE_SCHEMA
-from pytest_garl.engine import Engine
+from pytest_garl.cases.case_sections import (
+    EVIDENCE,
+    LIMITS,
+    POLICY,
+    PREVENTABLE,
+    SEVERITY,
+    VIOLATION,
+    WORST,
+    Key,
+    Section,
+)
 from pytest_garl.execution.reference import SYSTEM_NAME
 from pytest_garl.fiducial import DICTIONARIES, FARTHEST_M, MOST_NESTED, SIDE_M
 from pytest_garl.scenarios.domains.domain import ABSENT, CONDITIONS
@@ -30,7 +40,6 @@ from pytest_garl.scenarios.static_bodies import STATIC_BODIES
 from pytest_garl.scenarios.story import GRADES, STORY
 from pytest_garl.scenarios.task import START_HEIGHT_M, START_OFFSET_M, StartMode
 from pytest_garl.scenarios.units import LIGHT, MOST_VISIBILITY_M
-from pytest_garl.verdicts import verdict
 
 Schema = dict[str, Any]
 DRAFT = "http://json-schema.org/draft-07/schema#"
@@ -55,43 +64,14 @@ def case_schema() -> Schema:
             "test": _text("node id of the test that failed"),
             "assertion": _text("node id of the test whose assertion failed, if it is another one"),
             **scenario,
-            "violation": _table(
-                {
-                    "signature": _text("type, cause, phase and sight"),
-                    "type": _one_of(get_args(verdict.ViolationType), "the type of the violation"),
-                    "property": _one_of(get_args(verdict.PropertyName), "the violated property"),
-                    "margin": _number("what is not above 0 is violated"),
-                    "unit": _text("unit of the margin"),
-                    "story": _text("what happened"),
-                    "worst_margin": _number("of the search; a worse one is not excused"),
-                    "weakest_grade": _one_of(GRADES, "the weakest adversary of the search"),
-                },
-                required=("signature", "type", "property", "margin", "unit", "story"),
-            ),
-            "severity": _severity(),
-            "preventable": _table(
-                {
-                    "answer": _one_of(get_args(Preventable)[1:], "could it have been prevented?"),
-                    "inevitable_s": _number("from then on no escape exists", low=0),
-                    "observed_s": _number("the camera first showed the body well enough", low=0),
-                    "escape": _one_of(get_args(Escape), "how"),
-                },
-                required=("answer", "inevitable_s"),
-            ),
-            "limits": _table(
-                {
-                    "distance_m": _number(
-                        "how far from the marker's centre it may land", 0, verdict.FARTHEST_M
-                    ),
-                    "time_s": _number("how long it may take", 0, verdict.LONGEST_S),
-                    "abort": _one_of(get_args(verdict.AbortRule), "when giving up is a violation"),
-                },
-                required=("distance_m", "time_s", "abort"),
-            ),
-            "policy": _table(
-                {"name": _text("who moved the NPCs"), "sha256": _text("hash of its weights")},
-                required=("name", "sha256"),
-            ),
+            "violation": _section([*VIOLATION, *WORST]),
+            "severity": {
+                "description": "what it takes",
+                "anyOf": [_section(each) for each in SEVERITY.values()],
+            },
+            "preventable": _section(PREVENTABLE),
+            "limits": _section(LIMITS),
+            "policy": _section(POLICY),
             "moves": _objects(
                 _list_of(
                     _row({"type": "integer", "minimum": 1}, _share(), _share()),
@@ -104,7 +84,10 @@ def case_schema() -> Schema:
                     "[decision, gene, added to it]",
                 )
             ),
-            "evidence": _evidence(),
+            # The hashes first, and what may be absent last.
+            "evidence": _section(
+                sorted(EVIDENCE, key=lambda key: (key.optional, "sha256" not in key.name))
+            ),
         },
         required=(
             *("schema", "system", "status", "map", "seed"),
@@ -248,49 +231,23 @@ def _scenario_properties() -> dict[str, Schema]:
     }
 
 
-def _severity() -> Schema:
-    names = _list_of({"type": "string"}, "conditions")
-    untried = {"untried": names}
-    body = _table(
-        {
-            "grade": _one_of(GRADES, "of the adversary that it takes"),
-            "type": _text("of the body"),
-            "objects": _whole("how many"),
-            "interference_s": _number("for how long it interferes", low=0),
-            "speed_mps": _number("how fast it is", low=0),
-            "when": _text("whether it comes while the marker is covered"),
-            "window_s": _number("of its entry", low=0),
-            **untried,
-        },
-        required=("type", "objects", "interference_s", "speed_mps"),
-    )
-    conditions = _table(
-        {
-            "conditions": names,
-            "values": names,
-            "largest": _text("the condition nearest to its limit"),
-            "largest_share": _number("how near", 0, 1),
-            "idle": names,
-            "placed": _flag("whether the marker lies beside the map's coordinate"),
-            **untried,
-        },
-        required=("conditions", "largest", "largest_share"),
-    )
-    return {"description": "what it takes", "anyOf": [body, conditions]}
+def _section(keys: Section) -> Schema:
+    """Return the schema of a section of a case."""
+    required = [key.name for key in keys if not key.optional]
+    return _table({key.name: _value(key) for key in keys}, required)
 
 
-def _evidence() -> Schema:
-    hashes = ("trajectory_sha256", "map_sha256", "system_sha256", "simulator_sha256")
-    own = {
-        **{name: _text("a hash; `garl cases renew` writes it") for name in hashes},
-        "cpu": _text("class of CPUs on which the hash holds"),
-        "neighbours": _whole("slightly different scenarios flown"),
-        "neighbours_failed": _whole("how many of them failed"),
-        "removed": _text("what shrinking removed"),
-        "versions": {"type": "object", "additionalProperties": {"type": "string"}},
-    }
-    engine = _one_of(get_args(Engine), "that flew the reference; without it Bullet")
-    return _table({**own, "engine": engine}, required=tuple(own))
+def _value(key: Key) -> Schema:
+    words = key.meaning or key.comment
+    if isinstance(key.kind, tuple):
+        return _one_of(key.kind, words)
+    if key.kind is float:
+        return _number(words, key.low, key.high)
+    if key.kind is list:
+        return _list_of({"type": "string"}, words)
+    if key.kind is dict:
+        return {"type": "object", "additionalProperties": {"type": "string"}}
+    return {str: _text, int: _whole, bool: _flag}[key.kind](words)
 
 
 def _marker() -> Schema:
