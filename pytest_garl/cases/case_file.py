@@ -205,12 +205,9 @@ def _behaviour_lines(case: Case) -> list[list[str]]:
 
 
 def _evidence_lines(evidence: CaseEvidence) -> list[list[str]]:
+    above = [key for key in EVIDENCE if key.name != "versions"]
     versions = [f"{quoted(name)} = {quoted(version)}" for name, version in evidence.versions]
-    return [
-        # The last of its keys is a table of its own.
-        ["[evidence]", *lines_of(evidence, EVIDENCE[:-1])],
-        ["[evidence.versions]", *versions],
-    ]
+    return [["[evidence]", *lines_of(evidence, above)], ["[evidence.versions]", *versions]]
 
 
 MOST_MOVES = round(LONGEST_S / DECISION_STEP_S)
