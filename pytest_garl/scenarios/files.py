@@ -129,10 +129,10 @@ def _read_section(table: Table, head: str, map: Map) -> dict[str, float]:
     ranges = ranges_of(head, map)
     optional = {name for name in ranges if name.startswith("destination_")}
     table.refuse_unknown({*ranges})
-    is_complete = head not in ("weather", *GROUPS)
-    required = {*ranges} - optional - {HEIGHT, *STORY} if is_complete else ()
-    for name in required:
-        table.get(name)
+    if head not in ("weather", *GROUPS):
+        for name in ranges:
+            if name not in {*optional, HEIGHT, *STORY}:
+                table.get(name)
     if bool(optional & {*table.values}) and not optional <= {*table.values}:
         table.get(next(iter(sorted(optional - {*table.values}))))
     if head in dict(map.all_objects) and {*table.values} & {*STORY}:

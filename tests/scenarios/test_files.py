@@ -92,6 +92,8 @@ IN_UNITS = dumps(
         ("[scenario.marker]", "[scenario.market]", "'scenario.market': unknown key"),
         ("schema = 2", "schema = 9", "'schema': found 9, expected 2"),
         ("x_m = 0.0", "", "'scenario.marker.x_m': missing"),
+        # The first of two, whatever the seed of hashes is.
+        ("x_m = 0.0\ny_m = 0.0", "", "'scenario.marker.x_m': missing"),
         ("x_m = 0.0", "x_m = 99.0", "'scenario.marker.x_m': found 99"),
     ],
 )
