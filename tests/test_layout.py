@@ -21,7 +21,7 @@ REACH = {
     "pytest_garl.verdicts.judge": 26,
     "pytest_garl.scenarios.files": 22,
     "pytest_garl.cases.case_file": 37,
-    "pytest_garl.plugin.options": 53,
+    "pytest_garl.plugin.options": 55,
 }
 """Modules of the package that an import pulls in at most, those included that it imports late."""
 MOST_FILES = 28

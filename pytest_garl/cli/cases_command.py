@@ -32,6 +32,7 @@ from pytest_garl.cli.shared import FOLDER, say
 from pytest_garl.errors import CorpusError, GarlError
 from pytest_garl.files.run_files import RUN_FOLDER
 from pytest_garl.messages import command, printable
+from pytest_garl.shrinking.plan import FEWEST_FOR_SAVED_CASE
 
 if TYPE_CHECKING:
     from pytest_garl.cases.renewal import Renewal
@@ -40,8 +41,6 @@ if TYPE_CHECKING:
 NO_PROOF = 3
 """Exit status of a replay that proves nothing."""
 EXIT_STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
-MINIMUM_RESHRINK_FLIGHTS = 9
-"""``shrinking.plan.LEAST_OF_SAVED``, whose module takes long to import."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -273,7 +272,7 @@ def _refusal(replayed: Replay, how: str) -> str:
 @FILE
 @click.option(
     "--flights",
-    type=click.IntRange(min=MINIMUM_RESHRINK_FLIGHTS),
+    type=click.IntRange(min=FEWEST_FOR_SAVED_CASE),
     default=40,
     show_default=True,
     help="Maximal number of flights.",

@@ -11,7 +11,8 @@ from pytest_garl.gate.comparison import LEVEL, Comparison, compare
 from pytest_garl.gate.pairs import FlightSummary, Pair, summary_of
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.shrinking.robustness import NEIGHBOURS, neighbours
+from pytest_garl.shrinking.plan import NEIGHBOURS
+from pytest_garl.shrinking.robustness import neighbours
 
 FlyScenarios = Callable[[Sequence[Scenario]], Sequence[CompletedFlight]]
 """Flies scenarios with the changed landing system."""

@@ -19,6 +19,7 @@ from pytest_garl.plugin.arguments import OPTIONS, Option
 from pytest_garl.plugin.xdist import CONTROLLER, SEED, is_xdist_worker
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.search.method_catalogue import default_policy, find_method, method_names
+from pytest_garl.shrinking.plan import FEWEST_FOR_VIOLATION
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.domains.domain import Domain
@@ -32,8 +33,6 @@ SMALLEST_POPULATION = 8
 SHRINK = 12
 """Flights for each new kind of violation: enough for the barest scenario, its neighbours, an escape
 and a shorter record of moves."""
-MINIMUM_SHRINK = 8
-"""``shrinking.plan.LEAST``, whose module takes long to import."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,8 +214,8 @@ def _shrink(text: str) -> int:
     if not text:
         return SHRINK
     number = _integer("shrink", text, 0)
-    if 0 < number < MINIMUM_SHRINK:
-        raise _wrong("shrink", text, f"0, or at least {MINIMUM_SHRINK} flights per new kind")
+    if 0 < number < FEWEST_FOR_VIOLATION:
+        raise _wrong("shrink", text, f"0, or at least {FEWEST_FOR_VIOLATION} flights per new kind")
     return number
 
 

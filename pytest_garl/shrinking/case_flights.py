@@ -16,9 +16,9 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.shrinking.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.shrinking.move_reduction import short_moves
-from pytest_garl.shrinking.plan import ESCAPES, Step
+from pytest_garl.shrinking.plan import ESCAPE_FLIGHTS, NEIGHBOURS, Step
 from pytest_garl.shrinking.prevention import collision_of, prevention_of
-from pytest_garl.shrinking.robustness import NEIGHBOURS, neighbours
+from pytest_garl.shrinking.robustness import neighbours
 from pytest_garl.shrinking.simplification import (
     genome_of_scenario,
     removals,
@@ -53,7 +53,7 @@ class CaseFlights:
     @property
     def left(self) -> int:
         """The flights that remain, without those that are kept to confirm an escape."""
-        kept = ESCAPES if self.request.asks_prevention else 0
+        kept = ESCAPE_FLIGHTS if self.request.asks_prevention else 0
         return self.request.budget - kept - self.flown
 
     def suffice_for(self, step: Step) -> bool:
@@ -200,7 +200,7 @@ class CaseFlights:
         )
         if collision is None:
             return NOT_ASKED
-        flights = min(ESCAPES, request.budget - self.flown)
+        flights = min(ESCAPE_FLIGHTS, request.budget - self.flown)
         return prevention_of(collision, lambda job: self._go(job, failing.scenario), flights)
 
     def result(self, case: Case | None, reason: str = "") -> CaseResult:

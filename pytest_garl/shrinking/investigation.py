@@ -17,10 +17,10 @@ from pytest_garl.shrinking.plan import (
     AS_FOUND,
     BARE_BY_POLICY,
     BARE_BY_RECORD,
-    CONFIRM,
+    CONFIRM_FLIGHTS,
+    NEIGHBOURS,
     SHORTER_RECORD,
 )
-from pytest_garl.shrinking.robustness import NEIGHBOURS
 from pytest_garl.shrinking.shrink import shrink
 from pytest_garl.shrinking.simplification import (
     bare_scenario,
@@ -169,7 +169,7 @@ class CaseBuilder:
         flights = self._flights
         # Steps back from an edge, and a shorter record of moves, need flights as well.
         reserve = flights.left // 3 if any(own for _, own in best.behaviour.moves) else 0
-        budget = flights.left - CONFIRM - reserve
+        budget = flights.left - CONFIRM_FLIGHTS - reserve
         if budget < 2:
             return with_shorter_record(flights, best)
         name = find_colliding_object(best.flight)

@@ -34,7 +34,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pytest_garl.shrinking.robustness import NEIGHBOURS
+NEIGHBOURS = 3
+"""Slightly different scenarios that are flown for each case (``robustness.py``)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,27 +54,27 @@ class Step:
         return self.takes + self.keeps
 
 
-CONFIRM = 1 + NEIGHBOURS
+CONFIRM_FLIGHTS = 1 + NEIGHBOURS
 """A scenario with recorded moves, and its neighbours."""
-ESCAPES = 3
+ESCAPE_FLIGHTS = 3
 """Kept from the start if a moving body was hit: two attempts from the latest state with a plan, and
 one from the state shortly after the body was observable."""
 
-CROSSING = Step(takes=1, keeps=CONFIRM)
-LOWER_GRADE = Step(takes=1, keeps=2 + CONFIRM)
-BARE_BY_POLICY = Step(takes=2, keeps=CONFIRM)
-BARE_BY_RECORD = Step(takes=1, keeps=CONFIRM)
-AS_FOUND = Step(takes=CONFIRM, keeps=0)
-SHORTER_RECORD = Step(takes=CONFIRM, keeps=0)
+CROSSING = Step(takes=1, keeps=CONFIRM_FLIGHTS)
+LOWER_GRADE = Step(takes=1, keeps=2 + CONFIRM_FLIGHTS)
+BARE_BY_POLICY = Step(takes=2, keeps=CONFIRM_FLIGHTS)
+BARE_BY_RECORD = Step(takes=1, keeps=CONFIRM_FLIGHTS)
+AS_FOUND = Step(takes=CONFIRM_FLIGHTS, keeps=0)
+SHORTER_RECORD = Step(takes=CONFIRM_FLIGHTS, keeps=0)
 
-LEAST = 1 + CONFIRM + ESCAPES
+FEWEST_FOR_VIOLATION = 1 + CONFIRM_FLIGHTS + ESCAPE_FLIGHTS
 """The fewest flights that can confirm a violation: one of a straight crossing or of the scenario
 without all that the failure should not need, the scenario as found with its neighbours, escapes."""
-ANOTHER_AS_FOUND = Step(takes=CONFIRM, keeps=LEAST)
+ANOTHER_AS_FOUND = Step(takes=CONFIRM_FLIGHTS, keeps=FEWEST_FOR_VIOLATION)
 """A further violation is flown only if the best one so far can still be shrunk."""
-LEAST_OF_SAVED = 2 + CONFIRM + ESCAPES
+FEWEST_FOR_SAVED_CASE = 2 + CONFIRM_FLIGHTS + ESCAPE_FLIGHTS
 """The fewest flights that can improve a saved case: one of it as it is, one of a simpler scenario,
 that scenario with recorded moves and its neighbours, escapes."""
-EXCEPTION = 2
+EXCEPTION_FLIGHTS = 2
 """A Python exception or a hang hardly depends on the scenario: one flight of the scenario without
 objects and weather, one of the scenario as found."""

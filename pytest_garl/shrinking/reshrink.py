@@ -38,9 +38,8 @@ from pytest_garl.shrinking.case_flights import (
 from pytest_garl.shrinking.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.shrinking.investigation import simplest_robust, with_shorter_record
 from pytest_garl.shrinking.new_case import new_case
-from pytest_garl.shrinking.plan import CONFIRM
+from pytest_garl.shrinking.plan import CONFIRM_FLIGHTS, NEIGHBOURS
 from pytest_garl.shrinking.removed import all_removed
-from pytest_garl.shrinking.robustness import NEIGHBOURS
 from pytest_garl.shrinking.shrink import shrink
 from pytest_garl.shrinking.simplification import complexity, genome_of_scenario
 
@@ -208,7 +207,7 @@ class CaseReshrinker:
         """Shrink with the flights that are left, divided by ``divisor``."""
         flights = self._flights
         # The last flights are for a result's neighbours and, if there are many, a shorter record.
-        reserve = CONFIRM if flights.left < 4 * CONFIRM else 2 * CONFIRM
+        reserve = CONFIRM_FLIGHTS if flights.left < 4 * CONFIRM_FLIGHTS else 2 * CONFIRM_FLIGHTS
         budget = (flights.left - reserve) // divisor
         if budget < 1:
             return saved

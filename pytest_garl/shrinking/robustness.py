@@ -10,10 +10,9 @@ from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import STORY
 from pytest_garl.scenarios.validity import repair
+from pytest_garl.shrinking.plan import NEIGHBOURS
 from pytest_garl.shrinking.simplification import CHOICES, genome_of_scenario
 
-NEIGHBOURS = 3
-"""Slightly different scenarios that are flown for each case."""
 JITTER = 0.002
 """Largest change of a gene, as a share of its range: 1.5 cm of the marker's disc, 2 to 8 cm of an
 object's start, a hundredth of a metre per second.  That is more than two CPUs differ, and less than

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pytest_garl.shrinking.case_request import CaseRequest
-from pytest_garl.shrinking.plan import ESCAPES, EXCEPTION, LEAST
+from pytest_garl.shrinking.plan import ESCAPE_FLIGHTS, EXCEPTION_FLIGHTS, FEWEST_FOR_VIOLATION
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,14 +22,14 @@ class ShrinkBudget:
 
 def most_flights(request: CaseRequest) -> int:
     """Return how many flights a request gets if there are enough."""
-    return EXCEPTION if request.is_exception else request.budget
+    return EXCEPTION_FLIGHTS if request.is_exception else request.budget
 
 
 def least_flights(request: CaseRequest) -> int:
     """Return the fewest flights that can confirm a violation of its kind."""
     if request.is_exception:
-        return EXCEPTION
-    least = LEAST - (0 if request.asks_prevention else ESCAPES)
+        return EXCEPTION_FLIGHTS
+    least = FEWEST_FOR_VIOLATION - (0 if request.asks_prevention else ESCAPE_FLIGHTS)
     return min(least, request.budget)
 
 

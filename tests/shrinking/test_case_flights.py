@@ -11,8 +11,8 @@ import pytest
 from pytest_garl.cases.case import RecordedBehaviour
 from pytest_garl.shrinking import case_flights
 from pytest_garl.shrinking.case_flights import CaseFlights, recorded_behaviour
-from pytest_garl.shrinking.plan import ESCAPES
-from pytest_garl.shrinking.robustness import NEIGHBOURS, neighbours
+from pytest_garl.shrinking.plan import ESCAPE_FLIGHTS, NEIGHBOURS
+from pytest_garl.shrinking.robustness import neighbours
 from tests.cases.samples import (
     LAWN,
     OBJECT_NAMES,
@@ -26,12 +26,12 @@ BEHAVIOUR = RecordedBehaviour(moves=((OBJECT_NAMES[0], ((0.5, 0.0),)),))
 
 def test_flights_that_confirm_an_escape_are_kept() -> None:
     flights = CaseFlights(make_case_request(20, VIOLATING_SCENARIO), FakeFlights(lambda *_: True))
-    assert flights.left == 20 - ESCAPES
+    assert flights.left == 20 - ESCAPE_FLIGHTS
     flights.fly_live(VIOLATING_SCENARIO)
-    assert flights.left == 19 - ESCAPES
+    assert flights.left == 19 - ESCAPE_FLIGHTS
     failing = flights.confirm(VIOLATING_SCENARIO, VIOLATING_SCENARIO, BEHAVIOUR)
     assert failing is not None
-    assert flights.left == 18 - NEIGHBOURS - ESCAPES
+    assert flights.left == 18 - NEIGHBOURS - ESCAPE_FLIGHTS
     result = flights.result(None, "reason")
     assert result.flights == 2 + NEIGHBOURS
 

@@ -20,8 +20,8 @@ from pytest_garl.shrinking.investigation import (
     simplest_robust,
     with_shorter_record,
 )
-from pytest_garl.shrinking.plan import LEAST
-from pytest_garl.shrinking.robustness import NEIGHBOURS, neighbours
+from pytest_garl.shrinking.plan import FEWEST_FOR_VIOLATION, NEIGHBOURS
+from pytest_garl.shrinking.robustness import neighbours
 from tests.cases.samples import (
     LAWN,
     OBJECT_NAMES,
@@ -36,7 +36,7 @@ from tests.support.recorded_flights import recorded, seen
 @pytest.mark.parametrize("seed", range(40))
 def test_case_builder_keeps_its_budget(seed: int) -> None:
     chance = random.Random(seed)
-    share, budget = chance.random(), chance.randrange(LEAST, 40)
+    share, budget = chance.random(), chance.randrange(FEWEST_FOR_VIOLATION, 40)
     fly = FakeFlights(lambda *_: chance.random() < share)
     scenarios = [violating_scenario(seed=100 * seed + number) for number in range(4)]
     result = CaseBuilder(make_case_request(budget, *scenarios), fly).build()

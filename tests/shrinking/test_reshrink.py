@@ -8,12 +8,10 @@ import pytest
 
 from pytest_garl.cases.case import Case
 from pytest_garl.cases.case_file import size_of
-from pytest_garl.cli import cases_command
 from pytest_garl.execution.reference import BUILT_IN, simulator_sha256
 from pytest_garl.execution.severity import Severity
-from pytest_garl.plugin import options
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.shrinking.plan import LEAST, LEAST_OF_SAVED
+from pytest_garl.shrinking.plan import FEWEST_FOR_SAVED_CASE
 from pytest_garl.shrinking.reshrink import (
     NOT_REPRODUCED,
     CaseReshrinker,
@@ -100,7 +98,7 @@ def test_reshrinker_makes_a_case_worse_in_no_respect(seed: int) -> None:
         return scenario == VIOLATING_SCENARIO or answers.setdefault((scenario, npcs), likely)
 
     case = saved(VIOLATING_SCENARIO, neighbours_failed=chance.randrange(4))
-    better, flights = shrunk(case, fails, chance.randrange(LEAST_OF_SAVED, 50))
+    better, flights = shrunk(case, fails, chance.randrange(FEWEST_FOR_SAVED_CASE, 50))
     assert flights >= 1
     if better is not None:
         one, other = simplicity(better, LAWN), simplicity(case, LAWN)
@@ -153,11 +151,6 @@ def test_a_case_that_passes_becomes_no_other_one() -> None:
     case = saved(VIOLATING_SCENARIO)
     result = CaseReshrinker(make_case_request(60), fly, case, as_it_fails=True).build()
     assert (result.case, result.reason) == (None, NOT_REPRODUCED)
-
-
-def test_options_require_the_least_flights_of_their_modules() -> None:
-    assert cases_command.MINIMUM_RESHRINK_FLIGHTS == LEAST_OF_SAVED
-    assert options.MINIMUM_SHRINK == LEAST
 
 
 SAVED = case()

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from pytest_garl.shrinking.case_request import CaseRequest
-from pytest_garl.shrinking.plan import LEAST
+from pytest_garl.shrinking.plan import FEWEST_FOR_VIOLATION
 from pytest_garl.triage.forecast import (
     SPENT_SHARE,
     expected_kinds,
@@ -52,9 +52,9 @@ def test_forecast_leaves_out_what_was_flown_beside_the_search() -> None:
 
 
 def test_forecast_counts_no_more_kinds_than_there_are_flights_for() -> None:
-    work = remaining_work((), KINDS, {"search": LEAST}, TIMES, 1)
-    assert work.at_most == LEAST
-    assert work.flights == pytest.approx(SPENT_SHARE * LEAST)
+    work = remaining_work((), KINDS, {"search": FEWEST_FOR_VIOLATION}, TIMES, 1)
+    assert work.at_most == FEWEST_FOR_VIOLATION
+    assert work.flights == pytest.approx(SPENT_SHARE * FEWEST_FOR_VIOLATION)
 
 
 def test_forecast_counts_one_flight_of_an_exception() -> None:
