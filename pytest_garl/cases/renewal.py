@@ -22,7 +22,7 @@ from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.local_pool import temporary_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
-from pytest_garl.execution.reference import Reference, reference_to, simulator_sha256
+from pytest_garl.execution.reference import Reference, reference_to
 from pytest_garl.execution.severity import Severity
 from pytest_garl.execution.severity_of_flight import severity_of
 from pytest_garl.execution.sources import data_files, sources_sha256
@@ -108,22 +108,17 @@ def _order(
     tests = collection.tests_of(case.system)
     finders = [test for test in tests if test.nodeid == case.test] or tests
     files = sorted({file for test in finders for file in test.data_files})
-    sources = SourceHashes(
-        system_sha256=sources_sha256(system, data_files(files, collection.root)),
-        simulator_sha256=simulator_sha256(simulator),
-        map_sha256=map.sha256,
-    )
     job = FlightJob.for_system(
         reference_to(system),
         map,
         case.behaviour.policy,
-        system_sha256=sources.system_sha256,
+        system_sha256=sources_sha256(system, data_files(files, collection.root)),
         simulator=simulator,
         map_folders=map_folders,
         limits=case.limits,
         flights=flights,
     )
-    return _Order(path=path, case=case, job=job, sources=sources)
+    return _Order(path=path, case=case, job=job, sources=SourceHashes.of_job(job))
 
 
 def _import_folder(case: Case, root: Path) -> Path:

@@ -15,6 +15,7 @@ from pytest_garl.engine import engine_of
 from pytest_garl.errors import GarlError, LandingSystemError
 from pytest_garl.execution.exit_guard import refusing_end
 from pytest_garl.execution.fly_and_judge import time_limit_s
+from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.reference import (
     BUILT_IN,
@@ -214,6 +215,15 @@ class SourceHashes:
             system_sha256=evidence.system_sha256,
             simulator_sha256=evidence.simulator_sha256,
             map_sha256=evidence.map_sha256,
+        )
+
+    @classmethod
+    def of_job(cls, job: FlightJob) -> Self:
+        """Return the hashes of the sources with which a job flies."""
+        return cls(
+            system_sha256=job.system_sha256,
+            simulator_sha256=simulator_sha256(job.simulator),
+            map_sha256=job.map_sha256,
         )
 
 

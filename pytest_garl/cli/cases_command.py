@@ -292,7 +292,8 @@ def shrink(project: _Project, file: Path, flights: int, workers: int, *, as_it_f
     holds, so it may have another name.
     """
     from pytest_garl.plugin.items.case_tests import case_setup
-    from pytest_garl.shrinking.reshrink import NOTHING_SIMPLER, shrink_case
+    from pytest_garl.shrinking.investigation import NOTHING_SIMPLER
+    from pytest_garl.shrinking.reshrink import shrink_case
 
     case = project.case(file)
     if as_it_fails and (case.status != "open" or case.assertion):

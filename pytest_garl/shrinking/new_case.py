@@ -19,9 +19,9 @@ from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.execution.severity_of_flight import severity_of
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
+from pytest_garl.shrinking.case_comparison import Removed, all_removed
 from pytest_garl.shrinking.case_flights import recorded_behaviour, without_idle
 from pytest_garl.shrinking.case_request import CaseRequest, CaseResult, FailingScenario
-from pytest_garl.shrinking.removed import Removed
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Verdict
 
@@ -99,6 +99,31 @@ def new_case(
         test=request.test or (failure.test if failure else ""),
         assertion=failure.assertion if failure else "",
         severity=severity,
+    )
+
+
+def replacing_case(
+    saved: Case,
+    request: CaseRequest,
+    failing: FailingScenario,
+    prevention: Prevention,
+    untried: tuple[str, ...],
+) -> Case:
+    """Return the case of a failing scenario that replaces a saved one."""
+    if saved.is_shrunk:
+        # Steps that were tried when it was saved need not be tried again.
+        untried = tuple(name for name in untried if name in saved.severity.untried)
+    found = new_case(request, failing, prevention, untried)
+    removed = all_removed(saved.evidence.removed, found.evidence.removed)
+    return dataclasses.replace(
+        found,
+        status=saved.status,
+        live=saved.live if prevention == NOT_ASKED else found.live,
+        accepted=saved.accepted,
+        worst=saved.worst,
+        policy=saved.policy,
+        policy_sha256=saved.policy_sha256,
+        evidence=dataclasses.replace(found.evidence, removed=removed),
     )
 
 

@@ -16,7 +16,13 @@ from pytest_garl.shrinking.case_flights import (
 )
 from pytest_garl.shrinking.case_request import FailingScenario
 from pytest_garl.shrinking.move_reduction import rounded
-from pytest_garl.shrinking.plan import CONFIRM_FLIGHTS, CROSSING, LOWER_GRADE, Step
+from pytest_garl.shrinking.plan import (
+    CROSSING,
+    CROSSING_AGAIN,
+    CROSSING_AGAIN_BEFORE_LOWER_GRADE,
+    LOWER_GRADE,
+    Step,
+)
 from pytest_garl.shrinking.simplification import (
     bare_scenario_around_marker,
     without_other_objects,
@@ -110,7 +116,7 @@ def _crossing_again(flights: CaseFlights, first: Scenario) -> Step:
     """Return what crossings at another time take, and keep for a lower grade of the body."""
     story = _graded_story(flights, first)
     has_lower_grade = story is not None and story.grade != CARELESS
-    return Step(takes=2, keeps=LOWER_GRADE.needs if has_lower_grade else CONFIRM_FLIGHTS)
+    return CROSSING_AGAIN_BEFORE_LOWER_GRADE if has_lower_grade else CROSSING_AGAIN
 
 
 def _graded_story(flights: CaseFlights, first: Scenario) -> Story | None:

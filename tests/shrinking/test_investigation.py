@@ -14,12 +14,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.shrinking.case_flights import CaseFlights
 from pytest_garl.shrinking.case_request import CaseResult, FailingScenario
-from pytest_garl.shrinking.investigation import (
-    NOT_REPRODUCED,
-    CaseBuilder,
-    simplest_robust,
-    with_shorter_record,
-)
+from pytest_garl.shrinking.investigation import NOT_REPRODUCED, Investigation, build_case
 from pytest_garl.shrinking.plan import FEWEST_FOR_VIOLATION, NEIGHBOURS
 from pytest_garl.shrinking.robustness import neighbours
 from tests.cases.samples import (
@@ -34,22 +29,22 @@ from tests.support.recorded_flights import recorded, seen
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_case_builder_keeps_its_budget(seed: int) -> None:
+def test_investigation_keeps_its_budget(seed: int) -> None:
     chance = random.Random(seed)
     share, budget = chance.random(), chance.randrange(FEWEST_FOR_VIOLATION, 40)
     fly = FakeFlights(lambda *_: chance.random() < share)
     scenarios = [violating_scenario(seed=100 * seed + number) for number in range(4)]
-    result = CaseBuilder(make_case_request(budget, *scenarios), fly).build()
+    result = build_case(make_case_request(budget, *scenarios), fly)
     assert result.flights == fly.count <= budget
 
 
-def test_case_builder_steps_back_until_all_neighbours_fail() -> None:
+def test_investigation_steps_back_until_all_neighbours_fail() -> None:
     def fails(scenario: Scenario, npcs: str) -> bool:
         # On the edge: near nominal fog it fails at round values alone.
         fog = scenario["environment.fog"]
         return fog >= 0.04 or (0 < fog < 0.04 and round(fog, 2) == fog)
 
-    result = CaseBuilder(make_case_request(60, VIOLATING_SCENARIO), FakeFlights(fails)).build()
+    result = build_case(make_case_request(60, VIOLATING_SCENARIO), FakeFlights(fails))
     assert result.case is not None
     assert result.case.evidence.neighbours_failed == 3
     assert result.case.scenario["environment.fog"] >= 0.04
@@ -62,7 +57,7 @@ def late_case(fails: Callable[[Scenario], bool], budget: int = 12) -> CaseResult
     """Return the result of an investigation of late landings in bad weather."""
     fly = FakeFlights(lambda scenario, _: fails(scenario), signature=LATE)
     request = make_case_request(budget, VIOLATING_SCENARIO, signature=LATE)
-    result = CaseBuilder(request, fly).build()
+    result = build_case(request, fly)
     assert result.flights == fly.count <= budget
     return result
 
@@ -104,7 +99,7 @@ def test_failure_at_the_exact_second_of_an_event_is_an_edge_case(
 
     fly = FakeFlights(fails, signature=LATE)
     found = VIOLATING_SCENARIO.replace(OUTAGE)
-    result = CaseBuilder(make_case_request(30, found, signature=LATE), fly).build()
+    result = build_case(make_case_request(30, found, signature=LATE), fly)
     assert result.case is not None
     assert result.case.scenario["outage.after"] == 2.0
     assert result.case.reason == reason
@@ -134,23 +129,12 @@ BEHAVIOUR = RecordedBehaviour(moves=((OBJECT_NAMES[0], ((0.5, 0.0),)),))
 HISTORY = [VIOLATING_SCENARIO.without(*OBJECT_NAMES[count:]) for count in (3, 2, 1)]
 
 
-def best(flights: CaseFlights) -> FailingScenario:
-    return FailingScenario(
-        origin=VIOLATING_SCENARIO,
-        scenario=VIOLATING_SCENARIO,
-        behaviour=BEHAVIOUR,
-        flight=flights.live_flight(VIOLATING_SCENARIO),
-        neighbours_failed=1,
-        neighbours_flown=NEIGHBOURS,
-    )
-
-
 def reduce(fails: set[Scenario], at_least: int = 0) -> FailingScenario | None:
-    flights = CaseFlights(
+    investigation = Investigation(
         make_case_request(60, VIOLATING_SCENARIO), FakeFlights(lambda each, _: each in fails)
     )
-    return simplest_robust(
-        flights, VIOLATING_SCENARIO, HISTORY, lambda _: BEHAVIOUR, at_least=at_least
+    return investigation.simplest_robust(
+        VIOLATING_SCENARIO, HISTORY, lambda _: BEHAVIOUR, at_least=at_least
     )
 
 
@@ -175,8 +159,17 @@ def test_simplest_robust_keeps_the_simplest_if_all_sit_on_an_edge() -> None:
 
 
 def test_flight_without_a_record_has_no_shorter_one() -> None:
-    flights = CaseFlights(make_case_request(60, VIOLATING_SCENARIO), FakeFlights(lambda *_: True))
-    assert with_shorter_record(flights, best(flights)) == (best(flights),)
+    request, fly = make_case_request(60, VIOLATING_SCENARIO), FakeFlights(lambda *_: True)
+    failing = FailingScenario(
+        origin=VIOLATING_SCENARIO,
+        scenario=VIOLATING_SCENARIO,
+        behaviour=BEHAVIOUR,
+        flight=dict(request.violations)[VIOLATING_SCENARIO],
+        neighbours_failed=1,
+        neighbours_flown=NEIGHBOURS,
+    )
+    assert Investigation(request, fly).shorter_record(failing) is None
+    assert fly.count == 0
 
 
 def test_what_was_never_read_is_dropped_without_a_flight(
@@ -197,7 +190,7 @@ def test_what_was_never_read_is_dropped_without_a_flight(
         flown.append(each)
         return True
 
-    result = CaseBuilder(request, FakeFlights(fails, signature=LATE)).build()
+    result = build_case(request, FakeFlights(fails, signature=LATE))
     assert result.case is not None
     assert all(each["depth.range_m"] == 100.0 for each in (*flown, result.case.scenario))
     assert "condition" in result.case.evidence.removed

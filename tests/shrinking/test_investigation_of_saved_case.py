@@ -11,14 +11,9 @@ from pytest_garl.cases.case_file import size_of
 from pytest_garl.execution.reference import BUILT_IN, simulator_sha256
 from pytest_garl.execution.severity import Severity
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.shrinking.case_comparison import no_worse, simplicity
+from pytest_garl.shrinking.investigation import NO_LONGER_REPRODUCED, simplify_case
 from pytest_garl.shrinking.plan import FEWEST_FOR_SAVED_CASE
-from pytest_garl.shrinking.reshrink import (
-    NOT_REPRODUCED,
-    CaseReshrinker,
-    is_simpler,
-    no_worse,
-    simplicity,
-)
 from pytest_garl.shrinking.robustness import neighbours
 from tests.cases.samples import (
     COLLIDING_OBJECT,
@@ -27,7 +22,6 @@ from tests.cases.samples import (
     OBJECT_NAMES,
     VIOLATING_SCENARIO,
     FakeFlights,
-    case,
     make_case_request,
 )
 from tests.cases.samples import case as dog_case
@@ -52,7 +46,7 @@ def shrunk(
     case: Case, fails: Callable[[Scenario, str], bool], flights: int = 60
 ) -> tuple[Case | None, int]:
     fly = FakeFlights(fails)
-    result = CaseReshrinker(make_case_request(flights), fly, case).build()
+    result = simplify_case(make_case_request(flights), fly, case)
     assert result.flights == fly.count <= flights
     return result.case, fly.count
 
@@ -61,7 +55,7 @@ def by_record(scenario: Scenario, npcs: str) -> bool:
     return npcs == "recorded" and COLLIDING_OBJECT not in scenario.removed_objects
 
 
-def test_reshrinker_shrinks_a_case_from_its_own_record() -> None:
+def test_saved_case_is_shrunk_from_its_own_record() -> None:
     case = saved(VIOLATING_SCENARIO)
     better, _ = shrunk(case, by_record)
     assert better is not None
@@ -72,7 +66,7 @@ def test_reshrinker_shrinks_a_case_from_its_own_record() -> None:
     assert no_worse(simplicity(better, LAWN), simplicity(case, LAWN))
 
 
-def test_reshrinker_uses_the_policy_if_the_record_gives_nothing_simpler() -> None:
+def test_saved_case_is_shrunk_by_the_policy_if_its_record_gives_nothing_simpler() -> None:
     records = {VIOLATING_SCENARIO}
 
     def fails(scenario: Scenario, npcs: str) -> bool:
@@ -89,7 +83,7 @@ def test_reshrinker_uses_the_policy_if_the_record_gives_nothing_simpler() -> Non
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_reshrinker_makes_a_case_worse_in_no_respect(seed: int) -> None:
+def test_simpler_case_is_worse_in_no_respect(seed: int) -> None:
     chance = random.Random(seed)
     answers: dict[tuple[Scenario, str], bool] = {}
 
@@ -106,14 +100,14 @@ def test_reshrinker_makes_a_case_worse_in_no_respect(seed: int) -> None:
         assert one != other or size_of(better, LAWN) < size_of(case, LAWN)
 
 
-def test_reshrinker_keeps_a_case_that_fails_only_as_it_is() -> None:
+def test_case_that_fails_only_as_it_is_stays() -> None:
     better, _ = shrunk(
         saved(VIOLATING_SCENARIO), lambda scenario, _: scenario == VIOLATING_SCENARIO
     )
     assert better is None
 
 
-def test_reshrinker_renews_evidence_of_other_sources() -> None:
+def test_evidence_of_other_sources_is_renewed() -> None:
     case = saved(VIOLATING_SCENARIO)
     old = dataclasses.replace(case.evidence, simulator_sha256="00" * 32)
     around = (VIOLATING_SCENARIO, *neighbours(VIOLATING_SCENARIO, LAWN))
@@ -134,9 +128,9 @@ def test_a_case_that_fails_in_another_way_becomes_one_of_that_only_if_asked(
     around = (VIOLATING_SCENARIO, *neighbours(VIOLATING_SCENARIO, LAWN))
     fly = FakeFlights(lambda scenario, _: scenario in around, "II:lost:descent")
     request = make_case_request(60)
-    result = CaseReshrinker(request, fly, case, as_it_fails=as_it_fails).build()
+    result = simplify_case(request, fly, case, as_it_fails=as_it_fails)
     if not as_it_fails:
-        assert (result.case, result.reason, fly.count) == (None, NOT_REPRODUCED, 1)
+        assert (result.case, result.reason, fly.count) == (None, NO_LONGER_REPRODUCED, 1)
         return
     assert result.case is not None
     assert result.signature == result.case.violation.signature == "II:lost:descent"
@@ -149,28 +143,8 @@ def test_a_case_that_fails_in_another_way_becomes_one_of_that_only_if_asked(
 def test_a_case_that_passes_becomes_no_other_one() -> None:
     fly = FakeFlights(lambda scenario, _: False)
     case = saved(VIOLATING_SCENARIO)
-    result = CaseReshrinker(make_case_request(60), fly, case, as_it_fails=True).build()
-    assert (result.case, result.reason) == (None, NOT_REPRODUCED)
-
-
-SAVED = case()
-
-
-def test_case_with_fewer_runs_is_simpler() -> None:
-    shorter = dataclasses.replace(SAVED, moves=((OBJECT_NAMES[-1], ((0.0, 0.0),)),))
-    assert is_simpler(shorter, SAVED, LAWN, outdated=False)
-    assert not is_simpler(SAVED, shorter, LAWN, outdated=False)
-    assert not is_simpler(SAVED, SAVED, LAWN, outdated=False)
-
-
-def test_case_that_is_worse_in_one_respect_is_not_simpler() -> None:
-    shorter = dataclasses.replace(SAVED, moves=((OBJECT_NAMES[-1], ((0.0, 0.0),)),), live=False)
-    assert not no_worse(simplicity(shorter, LAWN), simplicity(SAVED, LAWN))
-    assert not is_simpler(shorter, SAVED, LAWN, outdated=False)
-
-
-def test_case_with_new_evidence_is_simpler_than_an_outdated_one() -> None:
-    assert is_simpler(SAVED, SAVED, LAWN, outdated=True)
+    result = simplify_case(make_case_request(60), fly, case, as_it_fails=True)
+    assert (result.case, result.reason) == (None, NO_LONGER_REPRODUCED)
 
 
 def test_crossing_with_a_window_is_not_shrunk_further() -> None:

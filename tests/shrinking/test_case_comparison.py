@@ -1,12 +1,22 @@
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.shrinking.removed import Contents, Removed, all_removed
+from pytest_garl.shrinking.case_comparison import (
+    Contents,
+    Removed,
+    all_removed,
+    is_simpler,
+    no_worse,
+    simplicity,
+)
+from tests.cases.samples import OBJECT_NAMES, case
 
 LAWN = load_map("lawn")
 GENOME = genome_for(LAWN)
@@ -65,3 +75,23 @@ def test_what_was_removed_adds_up() -> None:
 
 def test_a_text_without_counts_adds_nothing() -> None:
     assert all_removed("the fog, by hand", "1 of 3 objects") == "1 of 3 objects"
+
+
+SAVED = case()
+
+
+def test_case_with_fewer_runs_is_simpler() -> None:
+    shorter = dataclasses.replace(SAVED, moves=((OBJECT_NAMES[-1], ((0.0, 0.0),)),))
+    assert is_simpler(shorter, SAVED, LAWN, outdated=False)
+    assert not is_simpler(SAVED, shorter, LAWN, outdated=False)
+    assert not is_simpler(SAVED, SAVED, LAWN, outdated=False)
+
+
+def test_case_that_is_worse_in_one_respect_is_not_simpler() -> None:
+    shorter = dataclasses.replace(SAVED, moves=((OBJECT_NAMES[-1], ((0.0, 0.0),)),), live=False)
+    assert not no_worse(simplicity(shorter, LAWN), simplicity(SAVED, LAWN))
+    assert not is_simpler(shorter, SAVED, LAWN, outdated=False)
+
+
+def test_case_with_new_evidence_is_simpler_than_an_outdated_one() -> None:
+    assert is_simpler(SAVED, SAVED, LAWN, outdated=True)

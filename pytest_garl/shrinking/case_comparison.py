@@ -1,14 +1,20 @@
-"""What shrinking removed from a scenario: objects, conditions, and the values of these."""
+"""How a case compares with what it was made from: what was removed, and whether it is simpler."""
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 import re
 from dataclasses import dataclass
 from typing import Self
 
-from pytest_garl.cases.case import NOTHING
+from pytest_garl.cases.case import NOTHING, Case
+from pytest_garl.cases.case_file import record_lines, size_of
 from pytest_garl.scenarios.conditions import active_conditions
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.shrinking.plan import NEIGHBOURS
+from pytest_garl.shrinking.simplification import complexity, genome_of_scenario
 
 _OBJECTS = re.compile(r"(\d+) of (\d+) objects?")
 _CONDITIONS = re.compile(r"(\d+) of (\d+) conditions?(?: \((\d+) of (\d+) values\))?")
@@ -116,3 +122,67 @@ def all_removed(before: str, after: str) -> str:
 
 def _counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simplicity:
+    """The respects in which two cases of one failure are compared; less of each is better.
+
+    The strongest grade of an object; objects; genes off nominal and their distance from it;
+    decisions at which an object moves, and runs of equal moves; characters of the record in the
+    file; neighbours that do not fail or were not flown; how much less the case asks of a repair;
+    whether the evidence comes from other sources than today's.
+    """
+
+    grade: int
+    objects: int
+    genes: int
+    distance: float
+    moving: int
+    runs: int
+    characters: int
+    doubtful_neighbours: int
+    excused: int
+    outdated: bool
+
+
+def simplicity(case: Case, map: Map, *, outdated: bool = False) -> Simplicity:
+    """Return how simple a case is."""
+    found = complexity(case.scenario, genome_of_scenario(case.scenario, map))
+    evidence = case.evidence
+    return Simplicity(
+        grade=found.grade,
+        objects=found.objects,
+        genes=found.genes,
+        distance=found.distance,
+        moving=sum(move != (0.0, 0.0) for _, own in case.moves for move in own),
+        runs=sum(len(list(itertools.groupby(own))) for _, own in case.moves),
+        characters=sum(len(line) for line in record_lines(case)),
+        doubtful_neighbours=max(NEIGHBOURS, evidence.neighbours) - evidence.neighbours_failed,
+        excused=_excused(case),
+        outdated=outdated,
+    )
+
+
+def _excused(case: Case) -> int:
+    """Return how much less a case asks of a repair: of recorded moves only, or nothing."""
+    if case.prevention.answer in ("sensor-limited", "unpreventable"):
+        return 2
+    return 0 if case.live else 1
+
+
+def no_worse(one: Simplicity, other: Simplicity) -> bool:
+    """Return whether ``one`` is at least as simple as ``other`` in every respect."""
+    names = [field.name for field in dataclasses.fields(Simplicity)]
+    return all(getattr(one, name) <= getattr(other, name) for name in names)
+
+
+def is_simpler(case: Case, saved: Case, map: Map, *, outdated: bool) -> bool:
+    """Return whether a case is no worse than the saved one and better in one respect.
+
+    ``outdated`` says that the saved case's evidence comes from other sources than today's.
+    """
+    one, other = simplicity(case, map), simplicity(saved, map, outdated=outdated)
+    if one == other:
+        return size_of(case, map) < size_of(saved, map)
+    return no_worse(one, other)
