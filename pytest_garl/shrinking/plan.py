@@ -30,7 +30,7 @@ A saved case that is to become simpler begins with its own record, then takes st
 its objects repeat their moves and, if that gives nothing simpler, by the search's policy.  A Python
 exception or a hang takes two flights: without anything, and as found.
 
-``investigation.py`` takes these steps.  All of its numbers of flights are here.
+``investigation.py`` takes these steps, with the numbers of flights below.
 """
 
 from __future__ import annotations
