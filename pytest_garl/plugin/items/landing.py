@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
-import math
 import sys
 from collections.abc import Callable
 from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
 
+from pytest_garl.plugin.items import outcomes
 from pytest_garl.plugin.items.failed_statement import AttributeRead, code_of
 
 if TYPE_CHECKING:
@@ -20,18 +20,16 @@ if TYPE_CHECKING:
     from pytest_garl.plugin.items.target import Target
     from pytest_garl.verdicts.verdict import Limits, Verdict
 
-NOT_JUDGED = "not judged"
-"""Begins why a test is skipped whose property the flight did not decide, or that leaves a violation
-to another test: one event fails one test."""
+T = TypeVar("T")
 
 
 class Landing:
     """One flown landing, as a test sees it.
 
-    Reading a property that the flight did not decide skips the test with the reason;
-    ``final_distance_m`` and ``elapsed_s`` can always be read.  ``reads`` is what ``test`` has read
-    so far, to distinguish a failure from another property's.  ``is_shown_elsewhere`` says
-    whether another test of the slot fails for the flight's violation.
+    Reading a property that the flight did not decide skips the test with the reason, as
+    ``outcomes.py`` decides; ``final_distance_m`` and ``elapsed_s`` can always be read.  ``reads``
+    is what ``test`` has read so far, to distinguish a failure from another property's.
+    ``is_shown_elsewhere`` says whether another test of the slot fails for the flight's violation.
     """
 
     def __init__(
@@ -95,22 +93,13 @@ class Landing:
         fails one test.
         """
         self._note("completed")
-        verdict = self._result.verdict
-        if verdict.completed:
-            return True
-        if verdict.primary is None and not verdict.excuse:
-            # It gave up, and limits(abort="ok") allows that.
-            self._undecided()
-        if verdict.primary is not None:
-            self._leave_to_another_test()
-        return False
+        return self._judged(outcomes.completed(self._result))
 
     @property
     def excused(self) -> str:
         """Why nobody could have landed; empty if somebody could, or if the UAV landed."""
         self._note("excused")
-        verdict = self._result.verdict
-        return verdict.excuse and (verdict.excuse_text or verdict.excuse)
+        return outcomes.excuse_of(self._result)
 
     @property
     def distance_to_landing_m(self) -> float:
@@ -120,14 +109,7 @@ class Landing:
         that place counts.
         """
         self._note("distance_to_landing_m")
-        if self.outcome == "slid":
-            return math.inf
-        touched = self._result.off_marker_m
-        if touched is not None:
-            return touched
-        if self.outcome != "landed":
-            self._undecided()
-        return self.final_distance_m
+        return self._judged(outcomes.distance_to_landing(self._result))
 
     @property
     def time_to_landing_s(self) -> float:
@@ -136,59 +118,19 @@ class Landing:
         Infinite if the UAV never landed although somebody could have.
         """
         self._note("time_to_landing_s")
-        result, verdict = self._result, self._result.verdict
-        if result.outcome != "landed":
-            if verdict.primary == "time":
-                return math.inf
-            self._undecided()
-        landed_s = result.elapsed_s if result.landed_s is None else result.landed_s
-        if verdict.primary == "distance":
-            # One event, one failing test: what landed elsewhere is not late as well.
-            return min(landed_s, self.limits.time_s)
-        return landed_s
+        return self._judged(outcomes.time_to_landing(self._result, self.limits))
 
     @property
     def collisions(self) -> tuple[str, ...]:
         """Names of the bodies that the UAV hit; "ground" for a hard touchdown."""
         self._note("collisions")
-        if self._result.collisions and self._result.verdict.primary == "distance":
-            # It had touched the ground off the marker before.
-            self._leave_to_another_test()
-        return self._result.collisions
+        return self._judged(outcomes.collisions(self._result))
 
     @property
     def verdict(self) -> Verdict:
         """The built-in judgement."""
         self._note("verdict")
         return self._result.verdict
-
-    @property
-    def inconclusive(self) -> bool:
-        """Whether the flight came to no end, and so decides nothing."""
-        return self._result.inconclusive
-
-    @property
-    def unjudged(self) -> str:
-        """Why no assertion can judge the flight, or nothing where one can."""
-        if self.inconclusive:
-            return f"inconclusive: {self._result.undecided}"
-        verdict = self._result.verdict
-        if verdict.primary == "crash":
-            return f"{NOT_JUDGED}: {verdict.story}"
-        gave_up = verdict.primary == "abort"
-        return f"{NOT_JUDGED}: the landing system gave up" if gave_up else ""
-
-    @property
-    def complaint(self) -> str:
-        """The landing system's own traceback below the story of a flight without judge."""
-        if self.inconclusive:
-            return (
-                f"{self.unjudged}. Nothing was decided: fly it again while the machine has nothing "
-                "else to do, or allow more time with --garl-timeout."
-            )
-        crash = self._result.crash
-        story = self._result.verdict.story
-        return f"{story}\n\n{crash.traceback}" if crash and crash.traceback else story
 
     @functools.cached_property
     def flight(self) -> Flight:
@@ -197,21 +139,19 @@ class Landing:
 
         return load(self._record)
 
-    def _leave_to_another_test(self) -> None:
-        """Skip the test if another one of the slot fails for the flight's violation."""
-        if self._is_shown_elsewhere():
+    def _judged(self, found: outcomes.PropertyRead[T]) -> T:
+        """Return a property's value, or skip the test as is decided for it."""
+        if found.undecided is not None:
+            pytest.skip(f"{outcomes.NOT_JUDGED}: {found.undecided}")
+        if found.belongs_elsewhere and self._is_shown_elsewhere():
             self.left_to_another_test = True
-            signature = self._result.signature
-            pytest.skip(f"{NOT_JUDGED}: another test of this flight fails for {signature}")
-
-    def _undecided(self) -> NoReturn:
-        pytest.skip(f"{NOT_JUDGED}: {self.excused or self._result.undecided}")
+            why = f"another test of this flight fails for {self._result.signature}"
+            pytest.skip(f"{outcomes.NOT_JUDGED}: {why}")
+        return found.value
 
     def _note(self, name: str) -> None:
         """Remember what the test reads, and in which line of its own body."""
         frame: FrameType | None = sys._getframe(2)
-        if frame is None or frame.f_code.co_filename == __file__:
-            return
         while frame is not None and frame.f_code is not self._code:
             frame = frame.f_back
         self.reads.append(AttributeRead(name=name, line=frame.f_lineno if frame else 0))

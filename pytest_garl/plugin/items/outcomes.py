@@ -1,29 +1,137 @@
-"""Decide the outcome of a landing item after its flight: pass, fail, xfail or skip, and why.
+"""Decide the outcome of a landing item, from its flight on: pass, fail, xfail or skip, and why.
 
-A test that reads a property which its flight did not decide is skipped while it runs, by
-``landing.py``.  Here an item is skipped only if nothing can judge its flight.
+Which test of a slot reports which violation is decided here, in this order:
 
-``decide`` is a pure function from facts to a decision.  Some facts cost a flight or an entry in the
-ledger: as long as such a fact is None, ``decide`` returns a ``Need`` instead, and ``resolve`` asks
-for the fact.  ``item_report.py`` gathers the facts and applies the decision, ``report_text.py``
-writes the text, and ``session_status.py`` decides the exit status of the session.
+1. Before the test's body: ``why_unjudged`` says whether no assertion can judge the flight.  Then
+   one test of the slot fails for it, and the others are skipped (``_unjudged_flight``).
+2. While the test reads a property: ``distance_to_landing`` and the three functions below it say
+   what it gets, or that it is skipped, because the flight did not decide the property or because
+   another test of the slot fails for the same event.
+3. After a failed assertion: ``is_about`` says whether it is about the flight's violation, or about
+   a property of the user's own.  Then ``_failed_search`` or ``_failed_case``.
+4. After a test of a saved case passed: ``_passed_case``.
+
+These are pure functions of facts.  Some facts cost a flight or an entry in the ledger: as long as
+such a fact is None, ``decide`` returns a ``Need`` instead, and ``resolve`` asks for the fact.
+``item_facts.py`` gathers the facts, ``landing.py`` and ``item_report.py`` apply what is decided,
+``report_text.py`` writes the text.  ``session_status.py`` decides the exit status of the session;
+it also checks that whatever an item leaves to another one is reported there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal, TypeVar
+from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
-from pytest_garl.cases.case import NoGateReason, Status
+if TYPE_CHECKING:
+    from pytest_garl.cases.case import NoGateReason, Status
+    from pytest_garl.execution.result import FlightResult
+    from pytest_garl.verdicts.verdict import Limits
 
+T = TypeVar("T")
 Outcome = Literal["passed", "failed", "xfailed", "skipped"]
 
 _MOVING_BODY = "IV:"
 """Begin of the signatures of collisions with moving bodies."""
 MINIMUM_FAILURES = 2
 """A violation repeats if at least this many of a slot's flights show it."""
+NOT_JUDGED = "not judged"
+"""Begins why a test is skipped that its flight does not judge."""
+
+
+def why_unjudged(result: FlightResult) -> str:
+    """Return why no assertion can judge a flight; empty if one can."""
+    if result.inconclusive:
+        return f"inconclusive: {result.undecided}"
+    match result.verdict.primary:
+        case "crash":
+            return f"{NOT_JUDGED}: {result.verdict.story}"
+        case "abort":
+            return f"{NOT_JUDGED}: the landing system gave up"
+    return ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PropertyRead(Generic[T]):
+    """What a test gets that reads a property of its flight: ``value``, unless it is skipped.
+
+    It is skipped if the flight did not decide the property; ``undecided`` says why.  If the value
+    shows the violation of another property (``belongs_elsewhere``), the test is skipped if another
+    test of the slot fails for that: one event fails one test.
+    """
+
+    value: T
+    undecided: str | None = None
+    belongs_elsewhere: bool = False
+
+
+def distance_to_landing(result: FlightResult) -> PropertyRead[float]:
+    """Return the distance of the landing, or of a touchdown too far off before; inf if it slid."""
+    if result.outcome == "slid":
+        return PropertyRead(value=math.inf)
+    if result.off_marker_m is not None:
+        return PropertyRead(value=result.off_marker_m)
+    if result.outcome == "landed":
+        return PropertyRead(value=result.final_distance_m)
+    return PropertyRead(value=math.inf, undecided=_why_undecided(result))
+
+
+def time_to_landing(result: FlightResult, limits: Limits) -> PropertyRead[float]:
+    """Return the time of the landing; inf if the flight needlessly had none."""
+    primary = result.verdict.primary
+    if result.outcome != "landed":
+        undecided = None if primary == "time" else _why_undecided(result)
+        return PropertyRead(value=math.inf, undecided=undecided)
+    landed_s = result.elapsed_s if result.landed_s is None else result.landed_s
+    # What landed elsewhere is not late as well: that is the same event.
+    return PropertyRead(value=min(landed_s, limits.time_s) if primary == "distance" else landed_s)
+
+
+def collisions(result: FlightResult) -> PropertyRead[tuple[str, ...]]:
+    """Return what the UAV hit, perhaps after it had touched the ground off the marker."""
+    hit, primary = result.collisions, result.verdict.primary
+    return PropertyRead(value=hit, belongs_elsewhere=bool(hit) and primary == "distance")
+
+
+def completed(result: FlightResult) -> PropertyRead[bool]:
+    """Return whether the mission was completed; what prevented it violates another property."""
+    verdict = result.verdict
+    if verdict.completed:
+        return PropertyRead(value=True)
+    if verdict.violation or verdict.excuse:
+        return PropertyRead(value=False, belongs_elsewhere=verdict.violation)
+    # It gave up, and limits(abort="ok") allows that.
+    return PropertyRead(value=False, undecided=_why_undecided(result))
+
+
+def excuse_of(result: FlightResult) -> str:
+    """Return why nobody could have landed; empty if somebody could, or if the UAV landed."""
+    verdict = result.verdict
+    return verdict.excuse and (verdict.excuse_text or verdict.excuse)
+
+
+def _why_undecided(result: FlightResult) -> str:
+    return excuse_of(result) or result.undecided
+
+
+_READ_BY: dict[str, frozenset[str]] = {
+    # A UAV may hit something after it has touched the ground off the marker.
+    "distance": frozenset({"distance_to_landing_m", "final_distance_m", "collisions"}),
+    "time": frozenset({"time_to_landing_s", "elapsed_s"}),
+    "collision": frozenset({"collisions"}),
+}
+_READ_BY_ALL = frozenset({"outcome", "verdict", "result", "completed", "excused"})
+"""The attributes of a landing that belong to each built-in property, and to all of them."""
+
+
+def is_about(attributes: Set[str], name: str | None) -> bool:
+    """Return whether an assertion that reads some attributes is about the property ``name``."""
+    if name is None:
+        return False
+    return bool(attributes & (_READ_BY_ALL | _READ_BY.get(name, frozenset({name}))))
 
 
 class Reason(Enum):

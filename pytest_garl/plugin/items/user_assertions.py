@@ -15,6 +15,7 @@ from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.plugin.items.failed_statement import FAILED_ASSERTION_TYPES, failure_of
 from pytest_garl.plugin.items.keys import target_of
 from pytest_garl.plugin.items.landing import Landing
+from pytest_garl.plugin.items.outcomes import why_unjudged
 from pytest_garl.plugin.items.target import Target
 from pytest_garl.scenarios.scenario import Scenario
 
@@ -70,11 +71,11 @@ class ItemAssertion:
         is_shown_elsewhere: Callable[[], bool] = lambda: False,
     ) -> UserFailure | None:
         """Return how the test fails on a flight, or None."""
+        if why_unjudged(flight.result):
+            return None
         landing = Landing(
             self._target, flight, self._function, is_shown_elsewhere=is_shown_elsewhere
         )
-        if landing.unjudged:
-            return None
         arguments = {"landing": landing, "scenario": scenario}
         # Another exception, or a skip, is no failed assertion.
         with contextlib.suppress(Exception, pytest.skip.Exception):

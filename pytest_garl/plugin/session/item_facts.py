@@ -23,6 +23,8 @@ from pytest_garl.plugin.items.outcomes import (
     Reflights,
     UnjudgedFlight,
     decide,
+    is_about,
+    why_unjudged,
 )
 from pytest_garl.plugin.items.target import Target
 from pytest_garl.plugin.items.user_assertions import ItemAssertion
@@ -171,7 +173,7 @@ class ItemFailure:
         )
         if found is None or found.assertion != self.failed_assertion.assertion:
             return False
-        return found.is_about(flight.result.verdict.primary) is not self.user_property
+        return is_about(found.attributes, flight.result.verdict.primary) is not self.user_property
 
     def repeats_in(self, run: Run, target: Target, flight: CompletedFlight) -> bool:
         """Return whether a reflight of the slot has the same violation."""
@@ -185,14 +187,13 @@ def failure_of_item(
 ) -> ItemFailure | None:
     """Return what an item's failure is about, or None if the test itself has an error."""
     assertion, test = ItemAssertion(item, target), test_of(item)
-    landing = item.stash[LANDING]
     failed: UserFailure | None = None
     user_property = False
-    if not landing.unjudged:
-        failed = failure_of(item.originalname, item.obj, error, landing.reads)
+    if not why_unjudged(result):
+        failed = failure_of(item.originalname, item.obj, error, item.stash[LANDING].reads)
         if failed is None:
             return None
-        user_property = not failed.is_about(result.verdict.primary)
+        user_property = not is_about(failed.attributes, result.verdict.primary)
     return ItemFailure(
         signature=failed.signature if failed and user_property else result.signature,
         test=test,
@@ -242,7 +243,7 @@ def another_test_fails(run: Run, target: Target, flight: CompletedFlight) -> boo
         # Whether the mission was completed decides nothing here: each such test would wait for
         # the others.
         failure = assertion.failure(flight, run.scenario(target), lambda: True)
-        if failure is not None and failure.is_about(flight.result.verdict.primary):
+        if failure is not None and is_about(failure.attributes, flight.result.verdict.primary):
             return True
     return False
 

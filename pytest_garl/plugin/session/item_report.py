@@ -19,6 +19,7 @@ from pytest_garl.plugin.items.outcomes import (
     Reason,
     UnjudgedFlight,
     resolve,
+    why_unjudged,
 )
 from pytest_garl.plugin.items.suggested_commands import shown_path
 from pytest_garl.plugin.items.target import Target
@@ -38,20 +39,22 @@ from pytest_garl.reports.html.naming import page_address, page_name
 
 def end_unjudged(item: pytest.Item) -> None:
     """Fail or skip a test whose flight no assertion can judge; ``outcomes`` decides which."""
-    landing = item.stash.get(LANDING, None)
-    target = target_of(item)
-    if landing is None or target is None or not landing.unjudged:
+    landing, target = item.stash.get(LANDING, None), target_of(item)
+    if landing is None or target is None:
+        return
+    result = landing.unnoted_result
+    if not (unjudged := why_unjudged(result)):
         return
     run = item.config.stash[RUN]
     facts = UnjudgedFlight(
-        inconclusive=landing.inconclusive,
+        inconclusive=result.inconclusive,
         alone=target.entry is not None or bool(run.options.repeat),
         expects_failure=item.get_closest_marker("xfail") is not None,
     )
     decision, _ = resolve(facts, slot_claim(run, target, item.nodeid))
     if decision.outcome == "skipped":
-        pytest.skip(landing.unjudged)
-    pytest.fail(landing.complaint, pytrace=False)
+        pytest.skip(unjudged)
+    pytest.fail(report_text.unjudged_text(result, unjudged), pytrace=False)
 
 
 def report_item(
@@ -72,7 +75,8 @@ def report_item(
     elif report.passed:
         writer.write_pass()
     elif landing.left_to_another_test:
-        writer.write_left()
+        # Another test of the slot reports the violation; the session checks that.
+        ItemRecord(left_to_another=True).add_to(report)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,10 +117,6 @@ class _Writer:
             self._write_failing_case(self.case, failure, decision, facts)
         elif failure is not None:
             self._write_violation(failure, decision, facts)
-
-    def write_left(self) -> None:
-        """Note that another test of the slot reports the violation; the session checks that."""
-        ItemRecord(left_to_another=True).add_to(self.report)
 
     def write_pass(self) -> None:
         """Write the outcome of a test that passed; only a saved case has more to say."""

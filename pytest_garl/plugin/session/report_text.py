@@ -81,6 +81,17 @@ def error_text(item: pytest.Item, target: Target, error: BaseException) -> str:
     return f"{cause}\n{repeat_line(item, target)}"
 
 
+def unjudged_text(result: FlightResult, unjudged: str) -> str:
+    """Return the text of a flight without judge, with the landing system's own traceback."""
+    if result.inconclusive:
+        return (
+            f"{unjudged}. Nothing was decided: fly it again while the machine has nothing else to "
+            "do, or allow more time with --garl-timeout."
+        )
+    crash, story = result.crash, result.verdict.story
+    return f"{story}\n\n{crash.traceback}" if crash and crash.traceback else story
+
+
 def inconclusive_text(item: pytest.Item, target: Target, undecided: str) -> FailureText:
     """Return the text of an inconclusive flight."""
     repeat = repeat_line(item, target)

@@ -10,7 +10,7 @@ from typing import Any
 from pytest_garl.cases.reference_proofs import renewal_line
 from pytest_garl.messages import command
 from pytest_garl.plugin.items.item_record import records
-from pytest_garl.plugin.items.landing import NOT_JUDGED
+from pytest_garl.plugin.items.outcomes import NOT_JUDGED
 from pytest_garl.plugin.items.suggested_commands import repeat_files_command, shown_path
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.session.run import FilmKey, Films, Run

@@ -14,6 +14,7 @@ from pytest_garl.cases.user_failure import UserFailure
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.plugin.items.failed_statement import failure_of
 from pytest_garl.plugin.items.landing import Landing
+from pytest_garl.plugin.items.outcomes import is_about
 from tests.support.results import flight_result
 
 RESULT = flight_result(
@@ -68,8 +69,8 @@ def digest(tmp_path: Path, body: str, helpers: str = "") -> str:
 def test_assertion_that_reads_collisions_is_about_them(tmp_path: Path, body: str) -> None:
     found = failing(tmp_path, body, "def hit(landing):\n    return landing.collisions\n")
     assert found is not None
-    assert found.is_about("collision")
-    assert not found.is_about(None)
+    assert is_about(found.attributes, "collision")
+    assert not is_about(found.attributes, None)
 
 
 @pytest.mark.parametrize(
@@ -86,7 +87,7 @@ def test_assertion_that_reads_something_else_is_not_about_collisions(
 ) -> None:
     found = failing(tmp_path, body)
     assert found is not None
-    assert not found.is_about("collision")
+    assert not is_about(found.attributes, "collision")
 
 
 @pytest.mark.parametrize(

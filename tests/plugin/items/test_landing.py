@@ -131,6 +131,13 @@ def test_property_is_left_to_another_test_that_fails_for_the_violation(name: str
     assert not alone.left_to_another_test
 
 
+def test_collisions_of_a_landing_off_the_marker_that_hit_nothing_are_judged() -> None:
+    off = {**LANDED, "signature": "I:line:seen", "primary": "distance", "completed": False}
+    one = landing(lambda: True, **off)
+    assert one.collisions == ()
+    assert not one.left_to_another_test
+
+
 def test_completed_mission_is_not_left_to_another_test() -> None:
     late = {**LANDED, "signature": "late:landed:descent", "primary": "time", "landed_s": 130.0}
     one = landing(lambda: True, **late)

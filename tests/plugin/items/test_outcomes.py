@@ -20,8 +20,11 @@ from pytest_garl.plugin.items.outcomes import (
     Reflights,
     UnjudgedFlight,
     decide,
+    is_about,
     resolve,
+    why_unjudged,
 )
+from tests.support.results import flight_result
 
 DOG, PERSON, OWN = "IV:dog:last-metre:unseen", "IV:person:descent:seen", "own:test_own:12345678"
 REPEATS = Reflights(failed=2, flown=2, same=True)
@@ -62,6 +65,50 @@ def unjudged(*, alone: bool, inconclusive: bool = False, **facts: Any) -> Unjudg
     """Return facts about a flight that no assertion can judge."""
     rest = {"expects_failure": False} | facts
     return UnjudgedFlight(alone=alone, inconclusive=inconclusive, **rest)
+
+
+@pytest.mark.parametrize(
+    ("result", "why"),
+    [
+        ({"outcome": "landed"}, ""),
+        ({"outcome": "collision", "primary": "collision"}, ""),
+        (
+            {"outcome": "crashed", "primary": "crash", "story": "It raised."},
+            "not judged: It raised.",
+        ),
+        (
+            {"outcome": "gave_up", "primary": "abort"},
+            "not judged: the landing system gave up",
+        ),
+        (
+            {"outcome": "inconclusive", "undecided": "3 flights hung"},
+            "inconclusive: 3 flights hung",
+        ),
+    ],
+)
+def test_no_assertion_judges_a_crash_a_forbidden_abort_and_no_end(
+    result: dict[str, Any], why: str
+) -> None:
+    assert why_unjudged(flight_result(**result)) == why
+
+
+@pytest.mark.parametrize(
+    ("attribute", "name", "about"),
+    [
+        ("distance_to_landing_m", "distance", True),
+        ("elapsed_s", "time", True),
+        ("collisions", "collision", True),
+        ("collisions", "distance", True),
+        ("collisions", "time", False),
+        ("outcome", "distance", True),
+        ("outcome", None, False),
+        ("crash", "crash", True),
+    ],
+)
+def test_assertion_is_about_the_property_whose_attributes_it_reads(
+    attribute: str, name: str | None, about: bool
+) -> None:
+    assert is_about({attribute}, name) is about
 
 
 @pytest.mark.parametrize(
