@@ -47,6 +47,8 @@ class {adapter}:
         if not self.is_there:
             return PositionSetpoint(position_m=there_m)
 
+        # The picture's top is the UAV's front. altitude_m is above the start; rangefinder_m, the
+        # reading of a rangefinder that looks down, is None without one.
         image_bgr = observation.image[:, :, ::-1].copy()
         time_s, altitude_m = observation.time_s, float(observation.position_m[2])
         # Of aviation. From the east it is math.pi / 2 - heading_rad. As a quaternion, x, y, z, w of
@@ -66,7 +68,9 @@ class {adapter}:
             return Land(diagnostics=seen)
         if answer == "abort":  # <- it gives up
             return Abort(diagnostics=seen)
-        # North, east, down; without turned() east, north, up. yaw_rad=None keeps the heading.
+        # North, east, down; without turned() east, north, up. Of forward, right, down of a UAV that
+        # is level: north = forward * cos(heading_rad) - right * sin(heading_rad),
+        # east = forward * sin(heading_rad) + right * cos(heading_rad). yaw_rad=None keeps the heading.
         return VelocitySetpoint(velocity_mps=turned(answer), yaw_rad=None, diagnostics=seen)  # <-
 '''
 

@@ -12,9 +12,8 @@ The modules, in the order in which a session needs them:
 3. ``collection`` makes the items of each marked test: ``marker`` reads the marker, and a ``target``
    says what one item tests.  ``baseline_gate`` adds items that compare rates with a baseline.
 4. ``search_setup`` puts the searches of the selected items into the ledger when the first of them
-   asks for its ``landing``.  ``progress_display`` shows how far they are, in the words of
-   ``progress_text``; ``kind_news`` tells each new kind of violation, and ``time_left`` forecasts
-   the rest from what was flown.
+   asks for its ``landing``.  ``progress`` shows how far they are; ``kind_news`` tells each new
+   kind of violation, and ``time_left`` forecasts the rest from what was flown.
 5. ``landing`` skips a test that reads what its flight did not decide.  ``outcomes`` decides whether
    an item passes, fails, xfails or skips after that.  ``item_facts`` gathers the
    facts (with ``failed_statement`` and ``user_assertions``), and ``item_report`` writes the

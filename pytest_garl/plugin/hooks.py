@@ -200,7 +200,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     run = session.config.stash.get(RUN, None)
     if run is None:
         return (yield)
-    from pytest_garl.plugin.terminal.progress_display import show_progress
+    from pytest_garl.plugin.terminal.progress import show_progress
     from pytest_garl.plugin.termination import telling_workers
 
     with show_progress(run, session.config), telling_workers(run.ledger):

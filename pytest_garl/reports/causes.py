@@ -11,6 +11,7 @@ import re
 from pytest_garl.cases.case import Case
 from pytest_garl.execution.severity import Severity
 from pytest_garl.messages import shortened
+from pytest_garl.verdicts.evidence import LOW_M
 
 MOST_NAMED = 3
 """Of more conditions than these a title counts the rest."""
@@ -45,7 +46,8 @@ _PHASES = {
     "transit": "on the way to the marker",
     "search": "in the search",
     "approach": "on the approach",
-    "descent": "in the descent",
+    # The phase is one of heights: the UAV may be climbing again.
+    "descent": f"below {LOW_M:g} m",
     "last-metre": "in the last metre",
 }
 

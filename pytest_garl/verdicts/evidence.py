@@ -203,6 +203,20 @@ class Evidence:
         levelled = turned.any() or top_m >= LOW_M or times[-1] - times[end] >= LEVEL_S
         return end if levelled and top_m >= AIRBORNE_M else len(heights)
 
+    def height_m(self, time_s: float) -> float:
+        """Return the height of the UAV above the place of its start."""
+        uav = self.flight.uav
+        return float(uav.position_m[uav.index_at(time_s), 2])
+
+    def climbs_mps(self, time_s: float) -> float:
+        """Return the vertical speed over the tenth of a second before a time."""
+        uav = self.flight.uav
+        end = uav.index_at(time_s)
+        start = min(uav.index_at(time_s - 0.1), max(0, end - 1))
+        lasted_s = float(uav.time_s[end] - uav.time_s[start])
+        risen_m = float(uav.position_m[end, 2] - uav.position_m[start, 2])
+        return risen_m / lasted_s if lasted_s else 0.0
+
     def phase_at(self, time_s: float) -> str:
         """Return the phase: take-off, transit, search, approach, descent, last-metre, standing."""
         flight = self.flight

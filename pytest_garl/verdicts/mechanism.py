@@ -37,6 +37,10 @@ MESSAGE_CHARS = 300
 """Length of an exception's message in a description; the flight's record has 1,000 characters."""
 TILTED_RAD = math.radians(20)
 """A touchdown beyond this angle is called tilted."""
+CLIMBING_MPS = 0.3
+"""A UAV that hits something climbs if it rises faster than this."""
+CLIMBED_M = 1.0
+"""The text says how low a UAV had been if it was this much higher in the end."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,16 +115,18 @@ def _collision(evidence: Evidence, contact: Contact, elsewhere: Finding | None) 
         verb = f"{elsewhere.story.removesuffix('.')}, then hit"
     else:
         verb = "Hit" if static else "Collided with"
-    view = ""
-    if not static and evidence.was_in_view(contact.body, contact.time_s):
+    if static:
+        view = _lost_text(evidence, contact.time_s)
+    elif evidence.was_in_view(contact.body, contact.time_s):
         view = " The camera had it in view within the last 2 s."
-    elif not static:
+    else:
         view = " The camera had not had it in view for 2 s."
+    climbs = static and evidence.climbs_mps(contact.time_s) > CLIMBING_MPS
     return Mechanism(
         primary="collision",
         violation_type="III" if static else "IV",
         signature=collision_signature(evidence, contact),
-        sentence=f"{verb} {contact.body} {speed}.{view}",
+        sentence=f"{verb} {contact.body} {speed}{', climbing' if climbs else ''}.{view}",
     )
 
 
@@ -222,7 +228,8 @@ def _no_landing_cause(evidence: Evidence, end: str) -> tuple[ViolationType, str,
     last = readable[-1]
     lost = at_s - last > LOST_AFTER_S
     if flight.outcome == "not_landed" and not lost:
-        text = f"Not landed although the marker was in view{_share_text(evidence, at_s)}.{report}"
+        text = f"Not landed although the marker was in view{_share_text(evidence, at_s)}."
+        text = f"{text}{_lowest_text(evidence, at_s)}{report}"
         return "late", f"late:not-landed:{phase}", text
     view = f"the marker was last readable at {last:.1f} s" if lost else "the marker was in view"
     if flight.outcome == "gave_up" and at_s >= (1 - RESERVE_SHARE) * evidence.limits.time_s:
@@ -262,6 +269,26 @@ def _share_text(evidence: Evidence, at_s: float) -> str:
     if share > ALL_SHARE:
         return " to the end"
     return f": readable in {100 * share:.0f} % of the pictures of the last {last_s:.0f} s"
+
+
+def _lost_text(evidence: Evidence, at_s: float) -> str:
+    """Return when and how high the marker was last readable, if it was lost before a collision."""
+    readable = [step.time_s for step in evidence.readable_until(at_s)]
+    if not readable or at_s - readable[-1] <= LOST_AFTER_S:
+        return ""
+    height_m = evidence.height_m(readable[-1])
+    return f" The marker was last readable at {readable[-1]:.1f} s, {height_m:.1f} m up."
+
+
+def _lowest_text(evidence: Evidence, at_s: float) -> str:
+    """Return how low a UAV had been before it climbed again; empty if it did not climb."""
+    uav = evidence.flight.uav
+    start = evidence.flying_from
+    heights = uav.position_m[start : uav.index_at(at_s) + 1, 2]
+    if not len(heights) or heights[-1] - heights.min() < CLIMBED_M:
+        return ""
+    lowest_s = float(uav.time_s[start + int(heights.argmin())])
+    return f" It had come down to {heights.min():.1f} m by {lowest_s:.1f} s, and climbed again."
 
 
 def _unranged_text(evidence: Evidence) -> str:

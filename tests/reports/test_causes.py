@@ -71,7 +71,7 @@ def shrunk(signature: str, severity: Severity, **fields: Any) -> Case:
         (
             "late:not-landed:descent",
             conditions(a="1", b="2", c="3", d="4"),
-            "a (1), b (2) and 2 more conditions: the time runs out in the descent",
+            "a (1), b (2) and 2 more conditions: the time runs out below 7 m",
         ),
         ("own:my_test", conditions(fog="visibility 10 m"), ""),
     ],

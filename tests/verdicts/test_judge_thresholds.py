@@ -108,6 +108,45 @@ def test_a_marker_not_readable_for_three_seconds_is_lost(
 
 
 @pytest.mark.parametrize(
+    ("last_s", "top_m", "words"),
+    [
+        (25.0, 3.0, "at 2.5 m/s, climbing. The marker was last readable at 25.0 s, 1.0 m up."),
+        (25.0, 1.02, "at 2.5 m/s. The marker was last readable at 25.0 s, 1.0 m up."),
+        (27.0, 3.0, "at 2.5 m/s, climbing. At 30.0 s"),
+    ],
+)
+def test_the_story_of_a_tree_says_when_the_marker_was_lost_and_whether_the_uav_climbed(
+    last_s: float, top_m: float, words: str
+) -> None:
+    subject = flight(
+        "collision",
+        (0.0, 0.0, top_m),
+        contacts=hit("tree-1", "tree", "static"),
+        uav=track(
+            (0.0, 0.0, 0.0, 10.0), (24.0, 0.0, 0.0, 1.0), (29.9, 0.0, 0.0, 1.0), (30.0, 0, 0, top_m)
+        ),
+        steps=(step(last_s, marker=CLEAR), step(29.9, marker=FOGGY)),
+    )
+    assert words in judge(subject, Limits()).story
+
+
+@pytest.mark.parametrize(("lowest_m", "told"), [(0.4, True), (9.1, False)])
+def test_the_story_of_a_flight_without_landing_says_how_low_it_had_been(
+    lowest_m: float, told: bool
+) -> None:
+    subject = flight(
+        "not_landed",
+        (0.0, 0.0, 10.0),
+        uav=track(
+            (0.0, 0.0, -10.0, 10.0), (10.0, 0, 0, 10.0), (20.0, 0, 0, lowest_m), (30.0, 0, 0, 10.0)
+        ),
+        steps=(step(29.0, marker=CLEAR), step(29.9, marker=CLEAR)),
+    )
+    words = "to the end. It had come down to 0.4 m by 20.0 s, and climbed again."
+    assert (words in judge(subject, Limits()).story) == told
+
+
+@pytest.mark.parametrize(
     ("limit_s", "signature"),
     [(36.0, "II:gave-up-in-sight:approach"), (35.0, "late:no-time:approach")],
 )

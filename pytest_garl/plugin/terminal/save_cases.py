@@ -19,7 +19,7 @@ from pytest_garl.plugin.options import SHRINK
 from pytest_garl.plugin.session.probe_items import probe_requests
 from pytest_garl.plugin.session.run import Run
 from pytest_garl.plugin.terminal.kind_news import write_last_news
-from pytest_garl.plugin.terminal.progress_display import show_progress
+from pytest_garl.plugin.terminal.progress import show_progress
 from pytest_garl.plugin.terminal_text import begin_line, counted, duration, width_of, wrapped
 from pytest_garl.plugin.xdist import is_xdist_worker
 from pytest_garl.shrinking.case_request import CaseRequest

@@ -11,7 +11,7 @@ from pytest_garl.execution.severity import Severity
 from pytest_garl.plugin.terminal.kind_news import _shrunk
 from pytest_garl.shrinking.case_request import CaseResult
 from tests.cases.samples import case, make_case_request
-from tests.plugin.terminal.test_progress_display import on_a_terminal, screen
+from tests.plugin.terminal.test_progress_line import on_a_terminal, screen
 from tests.support.landing_project import project, run
 
 SEARCH = ("--garl-budget=16", "--garl-workers=1", "--tb=no")

@@ -11,8 +11,8 @@ import pytest
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import FlightSeconds, SearchProgress
 from pytest_garl.plugin.session.run import Run
-from pytest_garl.plugin.terminal import progress_text
-from pytest_garl.plugin.terminal.progress_text import ProgressReader, RunProgress, progress_line
+from pytest_garl.plugin.terminal import progress
+from pytest_garl.plugin.terminal.progress import ProgressReader, RunProgress, progress_line
 from pytest_garl.plugin.terminal.time_left import FIRST_FLIGHTS, NewKinds
 from pytest_garl.triage.forecast import RemainingWork, flights_after_search
 
@@ -95,7 +95,7 @@ class Flown:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(progress_text, "time", clock)
+    monkeypatch.setattr(progress, "time", clock)
     monkeypatch.setattr(NewKinds, "_known_in", lambda *args: frozenset())
     return clock
 

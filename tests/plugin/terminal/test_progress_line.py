@@ -163,7 +163,7 @@ def test_log_gets_a_line_now_and_then(pytester: pytest.Pytester, parallel: tuple
     slow_project(pytester)
     pytester.makeconftest(
         "from tiny_simulator import fly\n"
-        "import pytest_garl.plugin.terminal.progress_display as progress\n"
+        "import pytest_garl.plugin.terminal.progress as progress\n"
         "progress.LOG_PERIOD_S = 0.1\n"
         "def pytest_garl_fly(config): return fly\n"
     )
