@@ -70,7 +70,7 @@ class {adapter}:
             return Abort(diagnostics=seen)
         # North, east, down; without turned() east, north, up. Of forward, right, down of a UAV that
         # is level: north = forward * cos(heading_rad) - right * sin(heading_rad),
-        # east = forward * sin(heading_rad) + right * cos(heading_rad). yaw_rad=None keeps the heading.
+        # east = forward * sin(heading_rad) + right * cos(heading_rad). None keeps the heading.
         return VelocitySetpoint(velocity_mps=turned(answer), yaw_rad=None, diagnostics=seen)  # <-
 '''
 

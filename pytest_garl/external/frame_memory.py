@@ -59,7 +59,7 @@ class FrameMemory:
         return {"path": path, "bytes": self._bytes, **self._layout}
 
     def write(self, name: str, picture: NDArray[Any]) -> None:
-        """Put a picture where the program reads it."""
+        """Put a picture, (h, w, 3) or a depth of (h, w), where the program reads it."""
         np.copyto(self._arrays[name], picture, casting="no")
 
     def close(self) -> None:

@@ -98,7 +98,7 @@ def in_picture(
 def first_seen_s(uav: Track, shown: NDArray[np.bool_], since_s: float = -math.inf) -> float | None:
     """Return when a body was seen for the first time after ``since_s``; None if never.
 
-    ``shown`` says for each sample of the track whether the body is in the picture.
+    ``shown``, (n,), says for each sample of the track whether the body is in the picture.
     """
     before = np.searchsorted(uav.time_s, uav.time_s - FRAME_S + 1e-6, side="right") - 1
     seen = shown & shown[np.maximum(before, 0)] & (before >= 0)

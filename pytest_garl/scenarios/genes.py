@@ -147,7 +147,7 @@ class Genome:
         return draw(self, rng, names)
 
     def normalise(self, chromosome: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Map gene units onto [0, 1], for distances between chromosomes."""
+        """Map gene units, (..., n), onto [0, 1], for distances between chromosomes."""
         scaled: NDArray[np.float64] = (chromosome - self.lower) / (self.upper - self.lower)
         return scaled
 
@@ -155,7 +155,7 @@ class Genome:
 def draw(
     genome: Genome, rng: np.random.Generator, names: Iterable[str] | None = None
 ) -> NDArray[np.float64]:
-    """Draw a chromosome in which at most three optional genes are active, or all if dense.
+    """Draw a chromosome, (n,), with at most three active optional genes, or all if dense.
 
     With ``names`` these are active.
     """

@@ -72,7 +72,7 @@ class Exposure:
     dirt: NDArray[np.uint8] | None
 
     def blur_px(self, place_px: NDArray[Any]) -> float:
-        """Return how far a place of the ground moves over the picture during the exposure."""
+        """Return how many pixels the ground at a pixel, (2,), moves during the exposure."""
         if not self._moves:
             return 0.0
         first, last = (
@@ -82,7 +82,7 @@ class Exposure:
         return math.dist(first, last)
 
     def clear(self, row: NDArray[np.intp], column: NDArray[np.intp]) -> Array | None:
-        """Return the share of light that passes the lens at pixels; None for a clean lens."""
+        """Return the share of light, (n,), that passes at n pixels; None for a clean lens."""
         if self.dirt is None:
             return None
         return np.asarray(1 - self.dirt[row, column] / np.float32(255), np.float32)
@@ -110,7 +110,7 @@ class Exposure:
         return self._pixel_of_ground @ then.ground_of_pixel
 
     def moved(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return a sharp picture of the view as the movement blurs it."""
+        """Return a sharp picture of the view, (h, w, 3), as the movement blurs it."""
         if not self._moves:
             return image
         height, width = image.shape[:2]
@@ -134,7 +134,7 @@ class Exposure:
         return np.asarray(cv2.cvtColor(mean, cv2.COLOR_RGBA2RGB), np.uint8)
 
     def soiled(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return a picture as a dirty lens lets it through."""
+        """Return a picture, (h, w, 3), as a dirty lens lets it through."""
         if self.dirt is None:
             return image
         hidden = cv2.cvtColor(self.dirt, cv2.COLOR_GRAY2RGB)

@@ -40,7 +40,7 @@ def gloss_of(view: View, conditions: Conditions, focal_px: float) -> Gloss | Non
 
 
 def add_gloss(image: NDArray[np.uint8], view: View, gloss: Gloss | None) -> None:
-    """Add the sun's reflection."""
+    """Add the sun's reflection to a picture, (h, w, 3), in place."""
     if gloss is None:
         return
     (u, v), sigma = gloss.centre_px, gloss.sigma_px

@@ -85,7 +85,8 @@ def paint_ground(
 ) -> PaintedGround:
     """Paint the ground of one flight in full light; exposure comes later.
 
-    ``shift`` is where the pattern of fallen leaves and snow begins, as of ``cover_shift``.
+    ``shift``, (2,) in metres, is where the pattern of fallen leaves and snow begins, as of
+    ``cover_shift``.
     """
     return _lit(_painted(pad, map, conditions, shift), map, conditions, shift)
 

@@ -153,7 +153,10 @@ def cover(
     shift_m: NDArray[np.float64],
     conditions: Conditions,
 ) -> None:
-    """Lay leaves and snow over the image of a piece of ground, in place."""
+    """Lay leaves and snow over the image, (h, w, 3), of a piece of ground, in place.
+
+    The pattern begins at ``shift_m``, (2,); ``resolution`` is in metres a pixel.
+    """
     rows, columns = image.shape[:2]
     x = bounds_m[0] + (np.arange(columns) + 0.5) * resolution
     y = bounds_m[3] - (np.arange(rows) + 0.5) * resolution

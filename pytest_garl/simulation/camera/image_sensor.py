@@ -49,7 +49,7 @@ class Sensor:
         self._salt = int(rng.integers(2**32))
 
     def expose(self, image: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
-        """Return the exposed picture with this frame's noise; ``image`` may be overwritten."""
+        """Return the exposed picture, (h, w, 3), with its noise; ``image`` may be overwritten."""
         if not self._neutral:
             image = np.asarray(cv2.LUT(image, self._table), dtype=np.uint8)
         digest = hashlib.blake2b(struct.pack("<Id", self._salt, time_s), digest_size=2).digest()

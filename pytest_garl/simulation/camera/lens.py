@@ -57,7 +57,7 @@ class Lens:
         """Length of each pixel's ray to the depth of 1, shape (H, W)."""
 
     def picture(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return a picture of ``pinhole`` as the lens shows it."""
+        """Return a picture of ``pinhole``, (h, w, 3), as the lens shows it, (H, W, 3)."""
         bent = cv2.remap(
             image, self._columns, self._rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )

@@ -79,7 +79,10 @@ def paint_patch(
     conditions: Conditions,
     cover_shift_m: NDArray[np.float64],
 ) -> MarkerPatch:
-    """Paint one marker of the pad as ``paint_ground`` does, without the ground about it."""
+    """Paint one marker of the pad as ``paint_ground`` does, without the ground about it.
+
+    ``cover_shift_m`` has the shape (2,).
+    """
     white = modules(marker.id, marker.dictionary)
     probes = len(white) * PROBES_PER_MODULE
     half, size = marker.side_m / (len(white) - 2) * len(white) / 2, probes * _PX_PER_PROBE

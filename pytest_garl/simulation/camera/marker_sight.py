@@ -74,7 +74,10 @@ class MarkerSight:
         gloss: Gloss | None,
         exposure: Exposure,
     ) -> MarkerView | None:
-        """Return how a frame shows the marker, or None where none of it is in the frame."""
+        """Return how a frame shows the marker, or None where none of it is in the frame.
+
+        ``segmentation`` has the shape (h, w).
+        """
         seen = self._points_m @ view.axes[:, :2].T - view.axes @ view.eye
         if seen[:4, 2].min() <= NEAR_M:
             return None
@@ -207,7 +210,10 @@ class BoardSight:
         gloss: Gloss | None,
         exposure: Exposure,
     ) -> MarkerView | None:
-        """Return how a frame shows the board, or None where nothing of it is in the frame."""
+        """Return how a frame shows the board, or None where nothing of it is in the frame.
+
+        ``segmentation`` has the shape (h, w).
+        """
         main = self._main.view(view, segmentation, layers, shadows, gloss, exposure)
         if not self._nested or (main and _is_whole(main)):
             return main

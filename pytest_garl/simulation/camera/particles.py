@@ -115,7 +115,10 @@ class Particles:
         view: View,
         time_s: float,
     ) -> None:
-        """Draw the particles that are in front of the objects in the frame."""
+        """Draw the particles that are in front of the objects in the frame.
+
+        ``image`` has the shape (h, w, 3), ``depth`` (h, w).
+        """
         if not self._clouds:
             return
         width, height = self._camera.width_px, self._camera.height_px

@@ -87,7 +87,7 @@ class PaintedSolid:
     drawn: Array
 
     def paint_onto(self, image: NDArray[np.uint8]) -> None:
-        """Draw these pixels over the image."""
+        """Draw these pixels over the image, (h, w, 3)."""
         window = image[self.rows, self.columns]
         cv2.copyTo(cv2.convertScaleAbs(self.drawn), self.covered.view(np.uint8), window)
 
@@ -159,9 +159,9 @@ class Solids:
     def draw(
         self, depth: Array, segmentation: NDArray[np.int32], view: View
     ) -> tuple[NDArray[np.intp], list[PaintedSolid]]:
-        """Draw all solids into depth and segmentation.
+        """Draw all solids into depth and segmentation, (h, w) each.
 
-        Returns the number of pixels of each segment, and the painted solids in drawing order.
+        Returns the number of pixels of each segment, (s,), and the painted solids in drawing order.
         """
         axes = view.axes.astype(np.float32)
         pixels = np.zeros(self._segments, np.intp)
@@ -256,7 +256,7 @@ class Solids:
 def draw_shadows(
     image: NDArray[np.uint8], view: View, shadows: Sequence[Shadow], conditions: Conditions
 ) -> None:
-    """Darken the ground in the shadows of the dynamic objects."""
+    """Darken the ground of an image, (h, w, 3), in the shadows of the dynamic objects."""
     if not sun_shines(conditions):
         return
     sun = conditions.sun

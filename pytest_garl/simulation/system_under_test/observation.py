@@ -51,7 +51,7 @@ class LazyObservation(Observation):
 
     @property
     def image(self) -> NDArray[np.uint8]:
-        """The RGB image, read-only."""
+        """The RGB image, (h, w, 3), read-only."""
         self._noted.add("image")
         return self._paint()
 
@@ -61,7 +61,7 @@ class LazyObservation(Observation):
 
     @property
     def depth_m(self) -> NDArray[np.float32]:
-        """The planar depth, read-only."""
+        """The planar depth, (h, w), in metres, read-only."""
         self._noted.add("depth_m")
         return self._depth_m
 
