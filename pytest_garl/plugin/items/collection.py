@@ -111,7 +111,7 @@ def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark) -> None:
 
 
 def _marks(target: Target) -> tuple[pytest.MarkDecorator, ...]:
-    """Return the mark by which ``-m`` selects cases that fail no run."""
+    """Return the mark by which ``-m`` selects saved cases with ``gates = false``."""
     header = target.entry.header if target.entry else None
     return (pytest.mark.garl_gates_nothing,) if header is not None and header.reason else ()
 
