@@ -45,6 +45,10 @@ class Cause:
             self.conditions & _conditions_in(scenario) or self.objects & _kinds_in(scenario)
         )
 
+    def is_in(self, scenario: Scenario) -> bool:
+        """Return whether all of it is in a scenario."""
+        return self.conditions <= _conditions_in(scenario) and self.objects <= _kinds_in(scenario)
+
     def made_nominal(self, scenario: Scenario, map: Map) -> Scenario:
         """Return the twin of a scenario: the same without the cause."""
         values: dict[str, float] = {}

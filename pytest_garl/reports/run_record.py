@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
 from pytest_garl.cases.case import Case
+from pytest_garl.cases.shrunk_cause import cause_of_case
 from pytest_garl.execution.facts import SearchKey
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger_queries import LedgerFlight
@@ -39,6 +40,7 @@ from pytest_garl.reports.sentences import (
     origins_text,
     strikes_text,
 )
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.verdicts.ending import ending_of
 from pytest_garl.verdicts.kinds import hill_number
 from pytest_garl.verdicts.paper_metrics import top_k
@@ -182,7 +184,8 @@ class KindRecord:
         ``others`` may tell it too.  ``flights`` are its own: of several cases the one with the
         fewest conditions that was shrunk from one of them tells it, of equal ones that of the first
         flight.  The twin of another kind's flight may end alike, with nothing unusual, and its case
-        has another cause.
+        has another cause.  So may a case of another search, which tells it only if a flight has all
+        that the case takes.
         """
         place = search.system, search.map, ending_of(self.signature)
         mine = tuple(each for each in saved if place_of(each.case) == place)
@@ -191,9 +194,16 @@ class KindRecord:
             for case in (*(each.case for each in mine), *others)
             if place_of(case) == place and tells_cause(case)
         ]
+        # Shrinking and twins keep the seed of the flight with which they began.
+        seeds = [each.seed for each in flights]
+        if flights:
+            flown = [parse_scenario(each.scenario) for each in flights]
+            telling = [
+                case
+                for case in telling
+                if case.scenario.seed in seeds or any(map(cause_of_case(case).is_in, flown))
+            ]
         if len(telling) > 1:
-            # Shrinking and twins keep the seed of the flight with which they began.
-            seeds = [each.seed for each in flights]
             order = {seed: number for number, seed in reversed([*enumerate(seeds)])}
             telling.sort(key=lambda case: _order_of(case, order.get(case.scenario.seed)))
         return dataclasses.replace(self, saved=mine, case=next(iter(telling), None))

@@ -157,6 +157,24 @@ def test_of_the_cases_of_a_kinds_flights_the_simplest_tells_its_cause() -> None:
     assert flown.with_cases(saved).kinds[0].case is second
 
 
+@pytest.mark.parametrize(("flown_fog", "told"), [(0.0, False), (0.4, True)])
+def test_a_case_of_another_search_tells_no_cause_that_no_flight_has(
+    flown_fog: float, told: bool
+) -> None:
+    plain = shrunk("II:never-seen", conditions())
+    fog = dataclasses.replace(
+        shrunk("II:never-seen", conditions(fog="visibility 10 m")),
+        scenario=dataclasses.replace(
+            plain.scenario.replace({"environment.fog": 0.9}), seed=plain.scenario.seed + 1
+        ),
+    )
+    scenario = plain.scenario.replace({"environment.fog": flown_fog})
+    own = dataclasses.replace(plain, scenario=scenario)
+    flown = dataclasses.replace(record(kind("II:never-seen", 1)), flights=(ledger_flight(1, own),))
+    saved = [SavedCase(path=Path("a.toml"), case=fog, known=True)]
+    assert flown.with_cases(saved).kinds[0].case == (fog if told else None)
+
+
 def ledger_flight(number: int, case: Case) -> LedgerFlight:
     return LedgerFlight(
         id=FlightId(search="s", map="lawn", slot=Slot(generation=0, index=number)),
