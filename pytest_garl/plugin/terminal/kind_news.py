@@ -38,6 +38,7 @@ class KindNews:
         self._kinds, self._time_left = NewKinds(run), TimeLeft(run)
         self._tells_time = run.flight_s is None
         options = run.options
+        self._earlier = set(self._kinds.found(run.ledger)) if options.resume else set()
         quiet = config.get_verbosity() < 0
         self._is_wanted = bool(options.budget) and not options.repeat and not quiet
 
@@ -70,7 +71,9 @@ class KindNews:
             key = SearchKey(system=flight.system, map=flight.id.map)
             where = ledger.facts.search_names.get(search, key.place)
             what = headline(flight.result.verdict.story)
-            yield f"garl: found {signature}: {what} ({where}, {flight.id.slot_id})"
+            # A run that goes on tells again what its first part found: its output may be lost.
+            found = "found earlier" if (search, signature) in self._earlier else "found"
+            yield f"garl: {found} {signature}: {what} ({where}, {flight.id.slot_id})"
 
     def _time(self, ledger: Ledger, now: float) -> Iterator[str]:
         """Yield the time left once, in a run whose header could not tell it."""

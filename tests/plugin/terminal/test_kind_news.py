@@ -48,6 +48,15 @@ def test_kinds_of_saved_cases_are_not_told(searched: pytest.Pytester) -> None:
     assert "garl: found IV:dog:last-metre:unseen" not in text
 
 
+def test_a_resumed_run_says_which_kinds_were_found_earlier(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    search = (*SEARCH, "--garl-shrink=0")
+    assert "garl: found IV:dog:last-metre:unseen" in run(pytester, *search).stdout.str()
+    resumed = run(pytester, *search, "--garl-resume").stdout.str()
+    assert "garl: found earlier IV:dog:last-metre:unseen" in resumed
+    assert "garl: found IV" not in resumed
+
+
 def test_repeated_scenario_and_quiet_run_tell_nothing(pytester: pytest.Pytester) -> None:
     project(pytester)
     assert "garl: found" not in run(pytester, *SEARCH, "-q").stdout.str()
