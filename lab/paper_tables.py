@@ -1,0 +1,177 @@
+"""Write the paper's tables beside those of this code: ``python -m lab.paper_tables``.
+
+The rows are those of ``docs/results/experiments/paper.csv``, which ``python -m lab.experiment
+docs/results/experiments/paper.toml`` flies; the page is ``docs/results/paper.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from lab.experiment.metrics import COVERAGE, PAPER, TOP10, VIOLATIONS, MethodSearches, Metric
+from lab.experiment.metrics import searches_in_grid as searches_of
+from lab.experiment.results import ResultRow, read_rows
+from lab.experiment.spec import Experiment, read_experiment
+from lab.experiment.tables import NONE, markdown
+from lab.judges.intervals import p_of_signs
+
+ROOT = Path(__file__).parents[1]
+SPEC = ROOT / "docs" / "results" / "experiments" / "paper.toml"
+PAGE = ROOT / "docs" / "results" / "paper.md"
+BEGIN = "<!-- tables: python -m lab.paper_tables -->\n"
+END = "<!-- end of the tables -->\n"
+OWN = "garl-paper"
+"""The method of the paper."""
+
+PUBLISHED_SHARES = MappingProxyType(
+    {
+        ("OpenCV-MLS", "court"): 71.50,
+        ("TPHYolo-MLS", "court"): 30.96,
+        ("MM-MLS", "court"): 20.60,
+        ("OpenCV-MLS", "lawn"): 42.75,
+        ("TPHYolo-MLS", "lawn"): 38.25,
+        ("MM-MLS", "lawn"): 17.11,
+    }
+)
+"""Violations in percent of flights that GARL found: the paper's table of RQ1."""
+PUBLISHED_METHODS = MappingProxyType(
+    {
+        ("garl-paper", "court"): ("20.60", "42", "0.19", "11.24", "12"),
+        ("garl-paper", "lawn"): ("17.11", "76", "0.19", "11.94", "12"),
+        ("ga", "court"): ("14.25", "73", "0.16", "4.92", "11"),
+        ("ga", "lawn"): ("9.23", "113", "0.16", "8.43", "11"),
+        ("random", "court"): ("9.37", "205", "0.13", "3.51", "11"),
+        ("random", "lawn"): ("8.52", "112", "0.13", "4.92", "11"),
+        ("offline-rl", "court"): ("2.25", NONE, "0.12", "1.41", "11"),
+        ("offline-rl", "lawn"): ("2.13", NONE, "0.12", "3.51", "11"),
+        ("online-rl", "court"): ("12.75", "104", "0.13", "4.92", "11"),
+        ("online-rl", "lawn"): ("5.94", "141", "0.13", "7.03", "11"),
+        ("surrogate-random", "court"): ("14.19", "67", "0.13", "8.43", "12"),
+        ("surrogate-random", "lawn"): ("13.53", "108", "0.13", "8.43", "12"),
+    }
+)
+"""Violations in percent, Top-10, parameter distance, coverage in percent, hours: the paper's table
+of RQ2, of MM-MLS."""
+TYPES: Mapping[str, Callable[[ResultRow], int]] = MappingProxyType(
+    {
+        "I": lambda row: row.type_i,
+        "II": lambda row: row.type_ii,
+        "III": lambda row: row.type_iii,
+        "IV": lambda row: row.type_iv,
+        "V": lambda row: row.type_v,
+    }
+)
+WEATHER_DISTANCE = Metric(
+    title="distance of weather", value_of=lambda row: row.weather_distance, digits=2
+)
+
+
+def tables(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
+    """Return what is flown and the tables of both questions, in Markdown."""
+    keys = {row.key for row in rows}
+    wanted = {
+        (each.system, each.map, each.method, seed, experiment.budget, grid.domain)
+        for grid in experiment.grids
+        for each in searches_of(experiment, grid, rows)
+        for seed in grid.seeds
+    }
+    flown = (
+        f"{len(wanted & keys)} of {len(wanted)} searches of {experiment.budget} flights are flown."
+    )
+    parts = flown, *(make(experiment, rows) for make in (_landing_systems, _methods, _pairs))
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _landing_systems(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
+    """Return the table of RQ1: how often, and how, the landing systems fail."""
+    lines = []
+    for each in searches_of(experiment, experiment.grids[0], rows):
+        published = f"{PUBLISHED_SHARES[each.system, each.map]:.1f}"
+        lines.append(
+            [
+                each.map,
+                each.system,
+                each.method,
+                published if each.method == OWN else NONE,
+                *(_mean(each, metric) for metric in (PAPER, VIOLATIONS)),
+                *(_per_100(each, count) for count in TYPES.values()),
+                _per_100(each, lambda row: row.late + row.off + row.hard + row.slid),
+                str(len(each.rows)),
+            ]
+        )
+    header = ("map", "system", "method", "paper, %", PAPER.title, "our definition, %")
+    return markdown((*header, *TYPES, "others", "seeds"), lines)
+
+
+def _methods(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
+    """Return the table of RQ2: each figure of the paper, a slash, and that of this code."""
+    lines = []
+    for each in searches_of(experiment, experiment.grids[1], rows):
+        shares, top10, distance, coverage, hours = PUBLISHED_METHODS.get(
+            (each.method, each.map), (NONE,) * 5
+        )
+        lines.append(
+            [
+                each.map,
+                each.method,
+                f"{shares} / {_mean(each, PAPER)}",
+                _mean(each, VIOLATIONS),
+                f"{top10} / {_mean(each, TOP10)}",
+                f"{distance} / {_mean(each, WEATHER_DISTANCE)}",
+                f"{coverage} / {_mean(each, COVERAGE)}",
+                f"{hours} / {each.hours:.1f}" if each.rows else f"{hours} / {NONE}",
+                str(len(each.rows)),
+            ]
+        )
+    header = ("map", "method", "violations, %", "our definition, %", "Top-10", "distance")
+    return markdown((*header, "coverage, %", "hours", "seeds"), lines)
+
+
+def _pairs(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
+    """Return the paper's method less each rival, paired by map and seed; empty without pairs."""
+    found = {(row.map, row.method, row.seed): row for row in rows if row.system == "MM-MLS"}
+    grid, lines = experiment.grids[1], []
+    for rival in (each for each in grid.methods if each != OWN):
+        pairs = [
+            (found[map, OWN, seed], found[map, rival, seed])
+            for map in grid.maps
+            for seed in grid.seeds
+            if (map, OWN, seed) in found and (map, rival, seed) in found
+        ]
+        if not pairs:
+            continue
+        cells = []
+        for metric in (PAPER, VIOLATIONS, WEATHER_DISTANCE, COVERAGE):
+            gaps = [metric.value_of(own) - metric.value_of(other) for own, other in pairs]
+            cells.append(f"{np.mean(gaps):+.{metric.digits}f} ({p_of_signs(gaps):.2f})")
+        lines.append([rival, str(len(pairs)), *cells])
+    titles = [metric.title for metric in (PAPER, VIOLATIONS, WEATHER_DISTANCE, COVERAGE)]
+    return markdown((f"{OWN} less", "pairs", *titles), lines) if lines else ""
+
+
+def _mean(searches: MethodSearches, metric: Metric) -> str:
+    return f"{searches.mean(metric):.{metric.digits}f}" if searches.rows else NONE
+
+
+def _per_100(searches: MethodSearches, count_of: Callable[[ResultRow], int]) -> str:
+    """Return how many of a hundred flights count, over all seeds."""
+    flights = searches.sum_of(lambda row: row.budget)
+    return f"{100 * searches.sum_of(count_of) / flights:.1f}" if flights else NONE
+
+
+def with_tables(page: str) -> str:
+    """Return the page with the tables of today's rows."""
+    head, begin, rest = page.partition(BEGIN)
+    _, end, tail = rest.partition(END)
+    if not begin or not end:
+        raise SystemExit(f"{PAGE}: found no lines {BEGIN!r} and {END!r}")
+    experiment = read_experiment(SPEC)
+    return f"{head}{begin}\n{tables(experiment, read_rows(experiment.rows))}\n{end}{tail}"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(with_tables(PAGE.read_text()))
