@@ -9,12 +9,15 @@ import click
 
 from pytest_garl.npcs.domain_policy import domain_with_policy
 from pytest_garl.scenarios.domains.domain import ABSENT, CONDITIONS, ELEVATION, Domain
+from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import BUILT_IN, DEFAULT_DOMAIN
 from pytest_garl.scenarios.genes import CONFINED_WEATHER
 from pytest_garl.scenarios.groups import GROUPS, WEATHER
 from pytest_garl.scenarios.light import NOON_DEG, TWILIGHT_DEG
+from pytest_garl.scenarios.maps.loading import load_map, map_names
 from pytest_garl.scenarios.quantities import unit_of
 from pytest_garl.scenarios.story import GRADES
+from pytest_garl.scenarios.use_file import use_text
 
 MEANINGS = {
     "field": "what a landing system in the field meets",
@@ -53,6 +56,20 @@ def show(name: str) -> None:
     NAME is a domain that comes with pytest-garl, or a TOML file.
     """
     click.echo(text_of(domain_with_policy(name, Path.cwd())), nl=False)
+
+
+@domain.command()
+@click.argument("name", default=DEFAULT_DOMAIN)
+def use(name: str) -> None:
+    """Print a model of use of a domain, to edit.
+
+    It states how often each condition and NPC occurs where you land, as --garl-method=use and `garl
+    risk` need it. Its numbers are an example, and none is claimed to be true. NAME is a domain that
+    comes with pytest-garl, or a TOML file.
+    """
+    found, folders = domain_with_policy(name, Path.cwd()), (Path.cwd() / "scenarios" / "maps",)
+    maps = [load_map(each, folders) for each in map_names(folders)]
+    click.echo(use_text(found.name, [(genome_of(found, each), each) for each in maps]), nl=False)
 
 
 def text_of(domain: Domain) -> str:

@@ -87,6 +87,10 @@ EXAMPLES = {
         "garl domain show field",
         "garl domain show my_domain.toml",
     ),
+    "domain use": (
+        "garl domain use field >use.toml",
+        "pytest --garl-budget=400 --garl-method=use -o garl_use=use.toml",
+    ),
     "export": (
         "garl export --mcap=flight.mcap court-g03-s17",
         "garl export --mcap=case.mcap lawn-II-gave_up-f5e89c",

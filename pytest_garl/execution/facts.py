@@ -117,12 +117,13 @@ class Facts:
         domain: str,
         npcs: str | None,
         archive: str | None,
+        use: str | None,
     ) -> dict[str, Any]:
         """Return what must be equal when a run is resumed."""
         named = {_VERSION: version, _SOURCES: package_sha256, "python": python, "engine": engine}
         wanted = {"seed": seed, "budget": budget, "method": method, "population": population}
         places = {"map": map, "domain": domain, "npcs": npcs}
-        return {**named, **wanted, **places, _ARCHIVE: archive}
+        return {**named, **wanted, **places, _ARCHIVE: archive, "model of use": use}
 
     @property
     def reported(self) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from pytest_garl.flight.flight import Crash
 from pytest_garl.messages import visible
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Verdict
 
-How = Literal["control", "stratified", "bred", "replayed"]
+How = Literal["control", "stratified", "bred", "replayed", "use", "inside", "outside"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,12 +27,18 @@ class Origin:
     ``court-g00-s03``, or ``archived-17`` for one of an earlier search.  ``expected`` is what the
     model of the landing system predicted: the proximity of each property, from 1 on a violation;
     ``fails`` the probability of a violation, None without a model.
+
+    One of a model of use is a plain draw ("use"), or a draw inside or outside of the ``region`` in
+    which a failure is predicted, in words; ``share`` is the share of landings in use for which such
+    draws stand, None for all others.
     """
 
     how: How
     parents: tuple[str, ...] = ()
     expected: dict[str, float] = field(default_factory=dict)
     fails: float | None = None
+    share: float | None = None
+    region: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -149,6 +149,11 @@ KEYS = (
         "begins, written when it ends (default: none).",
     ),
     Key(
+        name="garl_use",
+        help="File of the model of use from which --garl-method=use draws; `garl domain use` "
+        "prints one to edit (default: none).",
+    ),
+    Key(
         name="garl_duplicates",
         default="xfail",
         help="How to report a test that fails in the same assertion and with the same signature "

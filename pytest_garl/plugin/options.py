@@ -18,11 +18,17 @@ from pytest_garl.npcs.policy_catalogue import policy_names
 from pytest_garl.plugin.arguments import OPTIONS, Option
 from pytest_garl.plugin.xdist import CONTROLLER, SEED, is_xdist_worker
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
-from pytest_garl.search.method_catalogue import default_policy, find_method, method_names
+from pytest_garl.search.method_catalogue import (
+    USE,
+    default_policy,
+    find_method,
+    method_names,
+)
 from pytest_garl.shrinking.plan import FEWEST_FOR_VIOLATION
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.domains.domain import Domain
+    from pytest_garl.scenarios.use_file import UseFile
 
 _URL = re.compile(r"[\w.~:/?#@!$&*+,;=%-]+", re.ASCII)
 """An address without what ends it in Markdown or HTML."""
@@ -79,6 +85,8 @@ class Options:
     """When a search flies the probes of a landing system before."""
     archive: Path | None
     """The file that carries what searches know to later ones."""
+    use: UseFile | None
+    """The model of use, if the method draws from one."""
     cases: Path
     cases_named: bool
     """Whether the ini file or the command line names the folder of the cases."""
@@ -179,6 +187,7 @@ def read_options(config: pytest.Config) -> Options:
         ),
         probes=_word(config, "garl_probes", ("first", "always", "never")),
         archive=_file(config, "garl_archive"),
+        use=_use(config, text["method"]),
         cases=config.rootpath / str(config.getini("garl_cases") or CASES_FOLDER),
         cases_named=bool(config.getini("garl_cases")),
         folder=folder,
@@ -244,6 +253,24 @@ def _baseline(config: pytest.Config) -> Path | None:
 def _file(config: pytest.Config, key: str) -> Path | None:
     text = str(config.getini(key))
     return config.rootpath / text if text else None
+
+
+def _use(config: pytest.Config, method: str) -> UseFile | None:
+    """Return the model of use, which only one method needs."""
+    if method != USE:
+        return None
+    path = _file(config, "garl_use")
+    if path is None:
+        raise pytest.UsageError(
+            "garl_use: found no file, expected that of the model of use from which "
+            f"--garl-method={USE} draws: `garl domain use field >use.toml` prints one to edit"
+        )
+    from pytest_garl.scenarios.use_file import read_use
+
+    try:
+        return read_use(path)
+    except GarlError as error:
+        raise pytest.UsageError(f"garl_use: {error}") from error
 
 
 def _report(config: pytest.Config) -> Path | None:

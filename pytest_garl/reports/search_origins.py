@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from pytest_garl.search.model import PROPERTIES, proximities
 from pytest_garl.search.operators import Matrix
 from pytest_garl.simulation.npc_policy import PolicySpec
 
-HOWS: tuple[How, ...] = ("control", "stratified", "bred", "replayed")
+HOWS: tuple[How, ...] = get_args(How)
 
 Made = Sequence[tuple[LedgerFlight, Origin]]
 """The flights of a search in order, each with how its scenario was made."""

@@ -19,6 +19,9 @@ _MADE: Mapping[How, str] = {
     "stratified": "stratified",
     "bred": "bred",
     "replayed": "replayed",
+    "use": "plain",
+    "inside": "predicted",
+    "outside": "other",
 }
 
 TELLING_NPCS = 10

@@ -10,6 +10,7 @@ from pytest_garl.execution.result import FlightResult, Origin
 from pytest_garl.scenarios.genes import Genome
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.use_file import UseFile
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +27,7 @@ class SearchPlan:
 
     ``known`` are flights of earlier searches that would fly alike today.  ``suspects`` are
     scenarios in which something failed that is not the same: another system, or this one before it
-    was changed.  The first generation depends on neither.
+    was changed.  The first generation depends on neither.  ``use`` is what a user states of use.
     """
 
     map: Map
@@ -35,6 +36,7 @@ class SearchPlan:
     population: int
     known: tuple[FlownScenario, ...] = ()
     suspects: tuple[Scenario, ...] = ()
+    use: UseFile | None = None
 
 
 def archived_name(number: int) -> str:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from pytest_garl.search.method import Method, MethodDeclaration, SearchPlan
 
 DEFAULT_METHOD = "garl"
+USE = "use"
+"""The method that draws from a model of use."""
 
 
 @functools.cache

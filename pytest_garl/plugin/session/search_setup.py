@@ -190,6 +190,7 @@ class Searches:
             population=self.options.population,
             known=own.known,
             suspects=own.suspects,
+            use=self.options.use,
         )
         name = self.options.method
         if name in method_names() and libraries_off_baseline():

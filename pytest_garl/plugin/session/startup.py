@@ -149,6 +149,7 @@ def _facts(options: Options, archive: str | None = None) -> dict[str, Any]:
         domain=options.domain.label,
         npcs=options.policy_in(options.domain),
         archive=archive,
+        use=options.use.sha256 if options.use else None,
     )
 
 
