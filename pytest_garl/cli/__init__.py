@@ -28,6 +28,7 @@ COMMANDS = {
     "film": "film",
     "init": "init",
     "report": "report",
+    "risk": "risk",
     "schema": "schema",
     "train": "train",
 }

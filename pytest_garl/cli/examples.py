@@ -107,6 +107,10 @@ EXAMPLES = {
         "garl report --out=report",
         "garl report --json --out=run.json",
     ),
+    "risk": (
+        "garl risk",
+        "garl risk --json .garl/ledger.sqlite",
+    ),
     "schema": (
         "garl schema",
         "garl schema --out=.vscode/schemas",

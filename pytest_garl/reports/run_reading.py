@@ -147,7 +147,7 @@ def _search(
     method = facts.method
     control = control_arm(method, flights)
     random = {f.id.slot_id for f in flights if is_control(method, f.id.slot.generation)}
-    made = _with_origins(facts, flights)
+    made = with_origins(facts, flights)
     compares = control is not None and control.later.flights > 0
     generations = sorted({(each.id.search, each.id.slot.generation) for each in flights})
     progress = [found for each in generations if (found := facts.progress(*each))]
@@ -183,7 +183,7 @@ def _repeat_command(folder: str, files: Sequence[str], slot: str) -> str:
     return command(*words, *(() if folder == RUN_FOLDER else ("-o", f"garl_dir={folder}")))
 
 
-def _with_origins(facts: Facts, flights: Sequence[LedgerFlight]) -> Made:
+def with_origins(facts: Facts, flights: Sequence[LedgerFlight]) -> Made:
     """Return the flights of which the method tells how their scenarios were made."""
     origins: dict[tuple[str, int], list[Origin]] = {}
     made = []

@@ -143,14 +143,7 @@ class Use:
         share = float(np.mean(drawn))
         if not LEAST_SHARE <= share <= 1 - LEAST_SHARE:
             return None
-        covered = region.covers(table.values)
-        spreads = [
-            part * _deviation(int(np.count_nonzero(fails & place)), int(np.count_nonzero(place)))
-            for part, place in ((share, covered), (1 - share, ~covered))
-        ]
-        # Neyman (1934): in proportion to share and standard deviation.
-        best = spreads[0] / (spreads[0] + spreads[1])
-        flown_share = max(min(best, LARGEST_INSIDE), share)
+        flown_share = flown_share_of(share, fails, region.covers(table.values))
         return Strata(region=region, share=share, flown_share=flown_share)
 
     def _covered(self, region: Region, count: int) -> tuple[Matrix, Mask]:
@@ -172,6 +165,20 @@ class Use:
     def _scenario(self, row: Matrix, rng: np.random.Generator) -> Scenario:
         plan, seed = self._plan, int(rng.integers(2**32))
         return repair(decode(row, self._model.genome, map=plan.map.name, seed=seed), plan.map)
+
+
+def flown_share_of(share: float, fails: Mask, covered: Mask) -> float:
+    """Return the share of the flights in a region that has a ``share`` of use.
+
+    It is the one with the smallest variance for the flights so far (Neyman 1934): proportional to
+    share and standard deviation of each stratum.  A region has at least its share, and at most half
+    of the flights.
+    """
+    inside, outside = (
+        part * _deviation(int(np.count_nonzero(fails & place)), int(np.count_nonzero(place)))
+        for part, place in ((share, covered), (1 - share, ~covered))
+    )
+    return max(share, min(inside / (inside + outside), LARGEST_INSIDE))
 
 
 def _is_inside(place: int, share: float) -> bool:
