@@ -59,8 +59,6 @@ def risk_lines(risk: SearchRisk) -> Iterator[str]:
     else:
         yield f"  in use {_often(risk.probability, risk.parts)}"
         yield from (f"    {_part_text(each)}" for each in risk.parts)
-        if risk.region:
-            yield f"  predicted region: {risk.region}"
     for each in risk.kinds:
         yield f"  {each.kind}: {_rule_text(each)}"
 

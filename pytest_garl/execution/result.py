@@ -28,9 +28,9 @@ class Origin:
     model of the landing system predicted: the proximity of each property, from 1 on a violation;
     ``fails`` the probability of a violation, None without a model.
 
-    One of a model of use is a plain draw ("use"), or a draw inside or outside of the ``region`` in
-    which a failure is predicted, in words; ``share`` is the share of landings in use for which such
-    draws stand, None for all others.
+    One of a model of use is a plain draw ("use"), or a draw inside or outside of the region in
+    which a failure is predicted; ``share`` is the share of landings in use for which such draws
+    stand, None for all others.
     """
 
     how: How
@@ -38,7 +38,6 @@ class Origin:
     expected: dict[str, float] = field(default_factory=dict)
     fails: float | None = None
     share: float | None = None
-    region: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,7 +1,7 @@
 """Where landings fail: a rule over conditions for each kind of failure, with its error.
 
-A rule is learned from one half of the flights (``search/failure_rules.py``) and judged on the other
-half, which it has never seen.  A hash of the slot's name divides them.  A bred flight has whole
+A rule is learned from one half of the flights (``failure_rules.py``) and judged on the other half,
+which it has never seen.  A hash of the slot's name divides them.  A bred flight has whole
 conditions of earlier flights: it never judges a rule, and teaches one only if all flights that it
 is bred from do.  A rule that could be as good by chance is none.
 """
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_garl.search.failure_rules import ConditionTable, Mask, learn_rule
+from pytest_garl.reports.failure_rules import ConditionTable, Mask, learn_rule
 
 LARGEST_CHANCE = 0.05
 """Of chance to be as good on the flights that judge a rule, from which on it is none."""
@@ -25,8 +25,8 @@ LARGEST_CHANCE = 0.05
 class FailureRegion:
     """A rule that says where one kind of failure occurs, and how it did on held-out flights.
 
-    ``rule`` is empty if none was found.  Of ``held_out`` flights ``failing`` show the kind; the rule
-    covers ``covered`` of them, of which ``hits`` show it.
+    ``rule`` is empty if none was found.  Of ``held_out`` flights ``failing`` show the kind; the
+    rule covers ``covered`` of them, of which ``hits`` show it.
     """
 
     kind: str

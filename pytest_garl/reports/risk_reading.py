@@ -22,12 +22,12 @@ from pytest_garl.reports.failure_regions import (
     failure_region,
     taught_and_held_out,
 )
+from pytest_garl.reports.failure_rules import LEAST_FAILING, table_of_scenarios
 from pytest_garl.reports.run_reading import run_record_of, with_origins
 from pytest_garl.reports.run_record import SearchRecord
 from pytest_garl.reports.search_origins import Made
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.search.failure_rules import LEAST_FAILING, table_of_scenarios
 
 ANY_FAILURE = "any failure"
 
@@ -36,9 +36,8 @@ ANY_FAILURE = "any failure"
 class SearchRisk:
     """How often the landings of one landing system fail on a map, and where.
 
-    ``probability`` is None without a sample of use.  ``region`` is the predicted one, in words;
-    empty without one.  ``kinds`` are the rules of all failures and of each kind that enough flights
-    show.
+    ``probability`` is None without a sample of use.  ``kinds`` are the rules of all failures and of
+    each kind that enough flights show.
     """
 
     name: str
@@ -47,7 +46,6 @@ class SearchRisk:
     inconclusive: int
     probability: FailureProbability | None
     parts: tuple[SamplePart, ...]
-    region: str
     kinds: tuple[FailureRegion, ...]
 
 
@@ -86,7 +84,6 @@ def risk_of(search: SearchRecord, made: Made, map: Map) -> SearchRisk:
         inconclusive=len(search.inconclusive),
         probability=failure_probability(sample),
         parts=sample,
-        region=next((origin.region for _, origin in made if origin.region), ""),
         kinds=tuple(_regions(search, made, failing, map)),
     )
 

@@ -1,21 +1,24 @@
-"""use: scenarios as often as they occur in use, and in known shares more often where it fails.
+"""use: scenarios as often as they occur in use, and in known shares more often where it may fail.
 
 It estimates how often landings fail, and seeks nothing.  All scenarios are drawn from a model of
 use (``scenarios/use_model.py``):
 
 1. The first flights are plain draws: a sample of use.
-2. From flights so far the method predicts a region in which the landing system fails
-   (``search/failure_rules.py``): from those of an archive, if it knows at least so many, else from
-   the first 100 plain draws.  It counts how many of 100,000 draws lie in the region; these are not
-   flown.
-3. All later scenarios are draws in the region and draws outside of it, in shares that are fixed
-   before the first of them.  In the region more are flown than occur, up to half of the flights.
+2. The model of the landing system (``search/model.py``) is fitted to flights: to those of an
+   archive, if it knows at least so many, else to the first 100 plain draws.  The quarter of use
+   that is most likely to fail by this model is the predicted region.  It is found from 20,000
+   draws, which are not flown.
+3. Half of all later scenarios are draws in the region, half are draws outside of it.
 
 So the later flights are a sample from a mixture of known density: two strata of the model of use.
-Each scenario of the region weighs the region's share in use over its share in the flights, and an
-estimate is right whatever the region is; a good one makes it more precise.  No weight exceeds two
-(defensive mixture, Owen and Zhou 2000).  What failed decides neither when the sample of step 1 ends
-nor what it weighs, so that neither part is biased.
+An estimate from it is right whatever the region is, and more precise if more of the failures lie in
+it: a flight in the region weighs 1/4 over 1/2, any other one 3/4 over 1/2.  No weight exceeds two,
+so that a wrong region costs little (defensive mixture, Owen and Zhou 2000).  What fails decides
+neither when the plain draws end nor what they weigh, so that neither part is biased.
+
+On the stand-in of a landing, whose truth is known, ``python -m lab.failure_probability`` measures
+what the region is worth (docs/results/failure-probability.md).  A region of rules in words, as
+``garl risk`` prints them, holds too few of the failures to be worth anything here.
 
 A generation is asked for while the one before it is flown, so that no worker waits.
 """
@@ -24,47 +27,63 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.result import Origin
-from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.chromosome import decode, encode
+from pytest_garl.scenarios.genes import Genome
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.use_file import use_of
-from pytest_garl.scenarios.use_model import Matrix
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.failure_rules import (
-    LEAST_FAILING,
-    Mask,
-    Region,
-    learn_region,
-    table_of_rows,
-    table_of_scenarios,
-)
+from pytest_garl.search.columns import Columns, Mask
 from pytest_garl.search.method import FlownScenario, MethodDeclaration, SearchPlan
+from pytest_garl.search.model import MarginModel, proximities, share_above
 from pytest_garl.search.objectives import violation_proximity
+from pytest_garl.search.operators import Matrix
 from pytest_garl.search.seeding import seed_sequence
 
 LEARNED_FROM = 100
-"""Plain draws from which a region is learned if no archive knows of earlier flights."""
-MEASURED = 100_000
-"""Draws that measure the share of a region: a share of 10 % to 0.1 % (one standard deviation)."""
-BATCH = 10_000
-LEAST_SHARE = 1e-3
-"""A region with a smaller share of use is not flown: too few draws say how large it is."""
-LARGEST_INSIDE = 0.5
-"""Largest share of the flights that lie in the region."""
+"""Plain draws from which a region is learned if no archive knows of as many earlier flights."""
+REGION_SHARE = 0.25
+"""Share of use that the region has at most: less of it if landings are equally likely to fail."""
+MEASURED = 20_000
+"""Draws that find the region: its share of use is exact to 0.3 % (one standard deviation)."""
+BATCH = 500
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Strata:
-    """The region, its share in use, and the share of the flights that are drawn in it."""
+class PredictedRegion:
+    """The landings that are most likely to fail, by a model of the landing system.
 
-    region: Region
-    share: float
-    flown_share: float
+    The model is fitted to flights: their chromosomes (n, d), how near they came to violating each
+    property (n, p), and 1 for each that did (n,).  ``draws`` (m, d) are chromosomes drawn from a
+    model of use; ``share`` is the share of them in the region.
+    """
+
+    def __init__(
+        self, genome: Genome, rows: Matrix, proximity: Matrix, violates: Matrix, draws: Matrix
+    ) -> None:
+        # How rare a kind is does not matter here.
+        rarity = np.zeros(len(rows))
+        self._model = MarginModel(Columns(genome), rows, proximity, violates, rarity)
+        likely = self._likely(draws)
+        self._threshold = float(np.sort(likely)[math.ceil((1 - REGION_SHARE) * len(likely)) - 1])
+        self.share = float(np.mean(likely > self._threshold))
+
+    def covers(self, rows: Matrix) -> Mask:
+        """Return which chromosomes (m, d) lie in the region, shape (m,)."""
+        found: Mask = self._likely(rows) > self._threshold
+        return found
+
+    def _likely(self, rows: Matrix) -> Matrix:
+        """Return how likely chromosomes are to violate any property."""
+        found = np.empty(len(rows))
+        for begin in range(0, len(rows), BATCH):
+            expected = self._model.predict(rows[begin : begin + BATCH])
+            near = share_above(expected.proximity, 1.0, expected.spread)
+            found[begin : begin + BATCH] = 1 - np.prod(1 - near, axis=1)
+        return found
 
 
 class Use:
@@ -89,34 +108,33 @@ class Use:
         """How many generations the region is learned from."""
         self._generation = -1
         self._told: list[Sequence[FlownScenario]] = []
-        self._strata: Strata | None = None
-        self._drawn = 0
-        """How many scenarios were drawn in the strata."""
+        self._region: PredictedRegion | None = None
         self.origins: Sequence[Origin] = ()
 
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation."""
         self._generation += 1
+        from_archive = len(self._plan.known) >= LEARNED_FROM
         # The generation after the last one that teaches is asked for before its results are known.
-        first = 1 if self._knows_enough else self._learning + 1
-        if self._generation == first:
-            self._strata = self._predicted()
-        strata, count = self._strata, self._plan.population
-        if strata is None:
+        if self._generation == (1 if from_archive else self._learning + 1):
+            self._region = self._predicted(
+                self._plan.known
+                if from_archive
+                else [item for generation in self._told for item in generation]
+            )
+        region, count = self._region, self._plan.population
+        if region is None:
             self.origins = [Origin(how="use", share=1.0)] * count
             return [self._scenario(row, self._rng) for row in self._model.rows(count, self._rng)]
-        places = range(self._drawn, self._drawn + count)
-        self._drawn += count
-        inside = [_is_inside(place, strata.flown_share) for place in places]
-        rows = self._stratified(strata.region, inside)
-        words = strata.region.words
+        # The last generation may be flown in part: one place after the other takes turns.
+        inside = [place % 2 == self._generation % 2 for place in range(count)]
         self.origins = [
-            Origin(how="inside", share=strata.share, region=words)
+            Origin(how="inside", share=region.share)
             if each
-            else Origin(how="outside", share=1 - strata.share, region=words)
+            else Origin(how="outside", share=1 - region.share)
             for each in inside
         ]
-        return [self._scenario(row, self._strata_rng) for row in rows]
+        return [self._scenario(row, self._strata_rng) for row in self._stratified(region, inside)]
 
     def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Keep the flights from which the region is learned; return proximities to a violation."""
@@ -124,39 +142,24 @@ class Use:
             self._told.append(flown)
         return [(violation_proximity(item.result),) for item in flown]
 
-    @property
-    def _knows_enough(self) -> bool:
-        known = self._plan.known
-        failing = sum(item.result.verdict.violation for item in known)
-        return len(known) >= LEARNED_FROM and failing >= LEAST_FAILING
+    def _predicted(self, flown: Sequence[FlownScenario]) -> PredictedRegion | None:
+        """Return the region that flights suggest; None if all landings are equally likely."""
+        genome = self._plan.genome
+        region = PredictedRegion(
+            genome,
+            np.array([encode(item.scenario, genome) for item in flown]),
+            np.array([proximities(item.result) for item in flown]),
+            np.array([float(item.result.verdict.violation) for item in flown]),
+            self._model.rows(MEASURED, self._strata_rng),
+        )
+        return region if region.share > 0 else None
 
-    def _predicted(self) -> Strata | None:
-        """Return the strata that the flights so far suggest; None if they say too little."""
-        flown = list(self._plan.known) if self._knows_enough else []
-        flown = flown or [item for generation in self._told for item in generation]
-        table = table_of_scenarios([item.scenario for item in flown], self._plan.map)
-        fails = np.array([item.result.verdict.violation for item in flown])
-        region = learn_region(table, fails)
-        if region is None:
-            return None
-        drawn = [self._covered(region, BATCH)[1] for _ in range(MEASURED // BATCH)]
-        share = float(np.mean(drawn))
-        if not LEAST_SHARE <= share <= 1 - LEAST_SHARE:
-            return None
-        flown_share = flown_share_of(share, fails, region.covers(table.values))
-        return Strata(region=region, share=share, flown_share=flown_share)
-
-    def _covered(self, region: Region, count: int) -> tuple[Matrix, Mask]:
-        """Draw chromosomes, (count, size), and whether a region covers each."""
-        rows = self._model.rows(count, self._strata_rng)
-        covered = region.covers(table_of_rows(rows, self._model.genome, self._plan.map).values)
-        return rows, covered
-
-    def _stratified(self, region: Region, inside: Sequence[bool]) -> Sequence[Matrix]:
-        """Return chromosomes that lie in the region where it says so, and else outside of it."""
+    def _stratified(self, region: PredictedRegion, inside: Sequence[bool]) -> Sequence[Matrix]:
+        """Return chromosomes that lie in the region where ``inside`` is set, and else outside."""
         found: dict[bool, list[Matrix]] = {True: [], False: []}
         while any(inside.count(side) > len(found[side]) for side in found):
-            rows, covered = self._covered(region, BATCH)
+            rows = self._model.rows(BATCH, self._strata_rng)
+            covered = region.covers(rows)
             for side in found:
                 found[side] += list(rows[covered == side][: len(inside)])
         taken = {side: iter(rows) for side, rows in found.items()}
@@ -165,31 +168,6 @@ class Use:
     def _scenario(self, row: Matrix, rng: np.random.Generator) -> Scenario:
         plan, seed = self._plan, int(rng.integers(2**32))
         return repair(decode(row, self._model.genome, map=plan.map.name, seed=seed), plan.map)
-
-
-def flown_share_of(share: float, fails: Mask, covered: Mask) -> float:
-    """Return the share of the flights in a region that has a ``share`` of use.
-
-    It is the one with the smallest variance for the flights so far (Neyman 1934): proportional to
-    share and standard deviation of each stratum.  A region has at least its share, and at most half
-    of the flights.
-    """
-    inside, outside = (
-        part * _deviation(int(np.count_nonzero(fails & place)), int(np.count_nonzero(place)))
-        for part, place in ((share, covered), (1 - share, ~covered))
-    )
-    return max(share, min(inside / (inside + outside), LARGEST_INSIDE))
-
-
-def _is_inside(place: int, share: float) -> bool:
-    """Whether a place is the region's: of the first n places that share is, always."""
-    return math.floor((place + 1) * share) > math.floor(place * share)
-
-
-def _deviation(failing: int, count: int) -> float:
-    """Return the standard deviation of one flight; one of each outcome is added."""
-    fails = (failing + 1) / (count + 2)
-    return math.sqrt(fails * (1 - fails))
 
 
 METHOD = MethodDeclaration(make=Use, policy="waypoint", remembers=True)

@@ -13,8 +13,7 @@ learned in these steps:
    is worth more if it covers more, and a rule that says nothing is worth 0.
 4. A condition that adds little is left out, so that few flights give short rules.
 
-A *region* is what any of several rules covers: each next rule is learned from the scenarios that
-those before it do not cover.  All is deterministic, and takes some 0.1 s for 400 scenarios.
+All is deterministic, and takes some 0.1 s for 400 scenarios.
 
 For example: of 400 flights 40 fail, 30 of these among the 60 with a wind above 4 m/s.  The rule
 "wind.mean_mps above 4" is worth 60 / 400 * (30 / 60 - 40 / 400) = 0.06.
@@ -28,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.scenarios.genes import ON_ABOVE, SUN, Genome
+from pytest_garl.scenarios.genes import SUN
 from pytest_garl.scenarios.groups import DECOY_KINDS, GROUPS, QUANTITIES, WEATHER
 from pytest_garl.scenarios.light import sun_elevation_deg
 from pytest_garl.scenarios.maps.map import Map
@@ -50,10 +49,6 @@ LEAST_FAILING = 8
 """A rule is learned from at least this many failing scenarios."""
 LEAST_COVERED = 4
 """A rule covers at least this many of them."""
-LEAST_LIFT = 1.5
-"""In a rule of a region scenarios fail at least so many times as often as everywhere."""
-MOST_RULES = 4
-"""Rules of a region."""
 ABOVE, BELOW = "above", "below"
 
 
@@ -114,23 +109,6 @@ class Rule:
         return found
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Region:
-    """What any of some rules covers."""
-
-    rules: tuple[Rule, ...]
-
-    @property
-    def words(self) -> str:
-        """The region for a reader."""
-        return "; or ".join(each.words for each in self.rules)
-
-    def covers(self, table: Mapping[str, Matrix]) -> Mask:
-        """Return which scenarios of a table lie in it, shape (n,)."""
-        found: Mask = np.logical_or.reduce([each.covers(table) for each in self.rules])
-        return found
-
-
 Values = Callable[[str, float], Matrix]
 """Returns the values of a gene in all scenarios, shape (n,), and a default where there is none."""
 
@@ -146,25 +124,6 @@ class ConditionTable:
         """Return the table of some of the scenarios."""
         values = {key: each[chosen] for key, each in self.values.items()}
         return ConditionTable(features=self.features, values=values)
-
-
-def table_of_rows(rows: Matrix, genome: Genome, map: Map) -> ConditionTable:
-    """Return the table of chromosomes, shape (n, genome.size)."""
-    columns = {key: column for column, key in enumerate(genome.keys)}
-    fixed = dict(genome.fixed)
-
-    def values(key: str, default: float) -> Matrix:
-        if key in columns:
-            found: Matrix = rows[:, columns[key]]
-            return found
-        return np.full(len(rows), fixed.get(key, default))
-
-    def is_there(name: str) -> Mask:
-        if name in genome.removed:
-            return np.zeros(len(rows), dtype=bool)
-        return values(f"active.{name}", 1.0) > ON_ABOVE
-
-    return _table(values, is_there, map)
 
 
 def table_of_scenarios(scenarios: Sequence[Scenario], map: Map) -> ConditionTable:
@@ -305,19 +264,3 @@ def _tightest(conditions: Sequence[Condition]) -> tuple[Condition, ...]:
         if other is None or sign * each.threshold > sign * other.threshold:
             kept[each.key, each.side] = each
     return tuple(kept.values())
-
-
-def learn_region(table: ConditionTable, fails: Mask) -> Region | None:
-    """Return the region in which scenarios fail; None if no rule says anything."""
-    rules: list[Rule] = []
-    left = np.ones(len(fails), dtype=bool)
-    while len(rules) < MOST_RULES:
-        rule = learn_rule(table.of(left), fails[left])
-        if rule is None:
-            break
-        covered = rule.covers(table.values) & left
-        if np.mean(fails[covered]) < LEAST_LIFT * np.mean(fails):
-            break
-        rules.append(rule)
-        left &= ~covered
-    return Region(rules=tuple(rules)) if rules else None
