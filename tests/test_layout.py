@@ -44,6 +44,7 @@ KEPT_APART = {
     "reports/mcap/path_topics": "topics have a file for each subject",
     "reports/mcap/state": "topics have a file for each subject",
     "reports/mcap/transforms": "topics have a file for each subject",
+    "scenarios/use_model": "what is drawn; its file says what a user states",
     "search/methods/garl_paper": "a search method has a file of its own",
     "search/user_method": "every pytest run loads the catalogue, and few name such a method",
     "simulation/physics/leap": "one way to move; npc chooses among them",
