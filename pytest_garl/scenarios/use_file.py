@@ -209,7 +209,7 @@ def _weighted(table: Table, name: str, item: Quantity) -> Spread:
     found = [0.0] * (max(known.values()) + 1)
     for each in weights.values:
         found[known[each]] = weights.number(each, low=0.0)
-    if not sum(found) > 0:
+    if not any(found):
         raise table.error(name, f"found {shown(value)}, expected a weight above 0")
     return Spread(low=item.low, high=item.high, weights=tuple(found))
 

@@ -39,7 +39,8 @@ class Spread:
     def at(self, levels: Matrix) -> Matrix:
         """Return the quantiles at ``levels``, each from 0 to 1, of any shape."""
         if self.weights:
-            steps = np.cumsum(self.weights) / np.sum(self.weights)
+            steps = np.cumsum(self.weights)
+            steps /= steps[-1]
             # The last number with a weight, should rounding leave the sum below the level.
             last = int(np.flatnonzero(self.weights)[-1])
             numbers: Matrix = np.minimum(np.searchsorted(steps, levels, side="right"), last) + 0.0
