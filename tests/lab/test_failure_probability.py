@@ -54,7 +54,7 @@ def test_the_project_that_is_flown_goes_on_where_it_was_interrupted(
         commands.append(command)
         return Done()
 
-    monkeypatch.setattr(study.subprocess, "run", noted)
+    monkeypatch.setattr("lab.failure_probability.subprocess.run", noted)
     folder = tmp_path / "flown"
     assert fly(folder, 30, 1, 2, plain=True) == 0
     assert "--garl-population=30" in commands[0]

@@ -102,7 +102,7 @@ def test_a_rule_says_the_same_each_time_and_nothing_with_few_failures() -> None:
 
 
 def test_a_bred_flight_judges_no_rule_and_teaches_only_with_all_its_parents() -> None:
-    plain = {f"lawn-g00-s{number:02d}": () for number in range(40)}
+    plain: dict[str, tuple[str, ...]] = {f"lawn-g00-s{number:02d}": () for number in range(40)}
     taught, held_out = taught_and_held_out(plain)
     assert taught | held_out == {*plain}
     assert min(len(taught), len(held_out)) > 10
