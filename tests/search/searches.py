@@ -11,7 +11,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.method import FlownScenario, Method, SearchPlan
-from pytest_garl.search.method_catalogue import declaration_of, method_names
+from pytest_garl.search.method_catalogue import USE, declaration_of, method_names
 from pytest_garl.verdicts.verdict import Margin
 from tests.support.results import flight_result
 
@@ -49,7 +49,10 @@ def bred(method: Method, generations: int) -> list[list[Scenario]]:
 
 
 def every_method(*without: str) -> list[object]:
-    """Return the shipped methods as parameters; one that needs PyTorch is skipped without it."""
+    """Return the shipped methods as parameters; one that needs PyTorch is skipped without it.
+
+    The one that draws from a model of use is left out: it needs one (``methods/test_use.py``).
+    """
     has_torch = importlib.util.find_spec("torch") is not None
     return [
         pytest.param(
@@ -58,5 +61,5 @@ def every_method(*without: str) -> list[object]:
                 bool(declaration_of(name).extra) and not has_torch, reason="needs PyTorch"
             ),
         )
-        for name in sorted({*method_names()} - {*without})
+        for name in sorted({*method_names()} - {USE, *without})
     ]
