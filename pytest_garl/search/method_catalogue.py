@@ -53,16 +53,20 @@ def remembers(name: str) -> bool:
 
 
 def find_method(name: str) -> Callable[[SearchPlan], Method]:
-    """Return the factory of a shipped method, or of one named "module:factory"."""
+    """Return the factory of a shipped method, or of one named "module:factory".
+
+    Raises GarlError if it cannot be imported.
+    """
     if name in method_names():
         return declaration_of(name).make
     module, _, attribute = name.partition(":")
     try:
         make: Callable[[SearchPlan], Method] = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError, ValueError) as error:
+    except Exception as error:
+        # A user's module may raise anything.
         raise GarlError(
-            f"search method {name!r}: cannot be loaded ({error}); expected one of "
-            f"{', '.join(method_names())}, or 'module:factory' of an importable module"
+            f"search method {name!r}: cannot be loaded ({type(error).__name__}: {error}); expected "
+            f"one of {', '.join(method_names())}, or 'module:factory' of an importable module"
         ) from error
     return make
 

@@ -51,6 +51,19 @@ def test_a_users_method_is_named_by_its_module() -> None:
         make_method("nowhere:method", plan())
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("raise RuntimeError('no GPU')", "RuntimeError: no GPU"), ("def (", "SyntaxError: invalid")],
+)
+def test_a_users_method_whose_module_cannot_be_imported_is_one_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, words: str
+) -> None:
+    (tmp_path / "method_that_raises.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(GarlError, match=rf"'method_that_raises:make': cannot be loaded \({words}"):
+        make_method("method_that_raises:make", plan())
+
+
 @pytest.mark.parametrize("name", ["field", "calm"])
 def test_every_method_flies_with_graded_npcs_in_a_domain_that_names_a_grade(name: str) -> None:
     domain = domain_with_policy(name)
