@@ -65,7 +65,8 @@ class Corpus:
     """The saved cases of a project.
 
     A folder is listed once, and a file is read at most once, however many tests fly its case.
-    Saving looks at the folder again: another process may have saved the same case.
+    Saving looks at the folder again: another process may have saved the same case.  Methods that
+    list, read or write raise CorpusError or SavingError if that cannot be done.
     """
 
     def __init__(self, folder: Path, map_folders: tuple[Path, ...] = ()) -> None:
@@ -87,12 +88,15 @@ class Corpus:
         )
 
     def all_entries(self) -> tuple[CorpusEntry, ...]:
-        """Return all files of the corpus, system by system."""
+        """Return all files, system by system; raise CorpusError if they cannot be listed."""
         self._check_link()
         try:
             found = sorted(self.folder.iterdir()) if self.folder.is_dir() else ()
         except OSError as error:
-            raise CorpusError(f"{self.folder}: cannot be read: {error.strerror}") from error
+            raise CorpusError(
+                f"{self.folder}: cannot be read: {error.strerror}; expected a folder of cases that "
+                "this user may read, which the ini key garl_cases names"
+            ) from error
         folders = [each for each in found if each.is_dir() or each.is_symlink()]
         return tuple(entry for folder in folders for entry in self._in(folder))
 
@@ -143,13 +147,17 @@ class Corpus:
         return dump_case(case, lambda name: load_map(name, self.map_folders))
 
     def save_patch(self, case: Case, patches: Path, root: Path) -> Path:
-        """Write a patch that adds the case; the tree itself is left alone."""
+        """Write a patch that adds the case; the tree itself is left alone.
+
+        Raises CorpusError if the corpus is not in the project at ``root``.
+        """
         path = self._folder_of(case.system) / f"{case.id}.toml"
         try:
             text = patch_of(path, root, self._text(case))
         except ValueError as error:
             raise CorpusError(
-                f"{self.folder}: lies outside of the project at {root}: no patch"
+                f"{self.folder}: found these cases, expected a folder in the project at {root}, "
+                "which a patch changes; name one with the ini key garl_cases"
             ) from error
         return write_text_atomically(patches / f"{case.id}.patch", text)
 

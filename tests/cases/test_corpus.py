@@ -181,7 +181,7 @@ def test_unreadable_corpus_raises_one_error(
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "iterdir", refuse)
-    with pytest.raises(CorpusError, match="cannot be read: Permission denied"):
+    with pytest.raises(CorpusError, match=r"cannot be read: Permission denied; .*key garl_cases"):
         Corpus(tmp_path).all_entries()
 
 
@@ -201,6 +201,13 @@ def test_patch_applies_for_maps_with_strange_names(tmp_path: Path, name: str) ->
     (entry,) = corpus.all_entries()
     assert entry.problem == ""
     assert entry.case == strange
+
+
+def test_no_patch_is_written_for_a_corpus_outside_of_the_project(tmp_path: Path) -> None:
+    corpus = Corpus(tmp_path / "cases")
+    with pytest.raises(CorpusError, match=r"expected a folder in the project .*garl_cases"):
+        corpus.save_patch(case(), tmp_path / "patches", tmp_path / "project")
+    assert not (tmp_path / "patches").exists()
 
 
 def test_dangling_corpus_raises_one_error(tmp_path: Path) -> None:
