@@ -41,9 +41,9 @@ class ProgramSystem(abc.ABC):
     ``name`` is an identifier, ``folder`` is where its relative paths begin (by default that of the
     module that makes it), ``sources`` are patterns of files below ``folder``, of which an empty
     tuple means all files in ``home``, without tests and caches, and ``environment`` adds to the
-    environment of pytest.  A subclass sets ``settings``: all
-    that decides how it flies besides its sources, in a form whose ``repr`` is the same in every
-    process.
+    environment of pytest.  A subclass sets ``settings``: all that decides how it flies besides its
+    sources, in a form whose ``repr`` is the same in every process.  Raises LandingSystemError for a
+    value that is not valid, and for a second program of the same name in a module.
     """
 
     __name__: str
@@ -117,7 +117,8 @@ class ProgramSystem(abc.ABC):
     def source_hashes(self) -> dict[str, str]:
         """Return the hashes of its source files and of its settings, by name.
 
-        A file's name is its path from ``folder``, never an absolute one.
+        A file's name is its path from ``folder``, never an absolute one.  Raises LandingSystemError
+        if a pattern matches no file, or if there are too many files.
         """
         found = {}
         for file in self._source_files():

@@ -27,7 +27,7 @@ class ProgramProcess:
     What it writes to stderr, or to stdout if both are one, is read and its end is kept, so it can
     neither block on it nor fill a terminal; ``output`` keeps all of it.  ``options`` are those of
     ``subprocess.Popen``; ``ending_s`` is how long it may take to end by itself when its stdin is
-    closed.
+    closed.  Raises ProgramFailedError if it cannot be started.
     """
 
     def __init__(

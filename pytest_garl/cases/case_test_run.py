@@ -56,7 +56,8 @@ def run_case_tests(
 
     pytest runs in ``root`` on the file of the test that found the case, or on all files if no test
     is known.  The case counts as fixed, so that no failure is expected.  ``live`` lets the policy
-    steer the objects; otherwise they repeat their recorded moves.
+    steer the objects; otherwise they repeat their recorded moves.  Raises GarlError if pytest
+    itself fails, as for an error of usage.
     """
     with single_case_corpus(case, live=live) as folder:
         report = folder / "report.xml"

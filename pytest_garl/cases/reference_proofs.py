@@ -34,7 +34,7 @@ class Proofs:
         return case if sources is None else with_sources(case, sources)
 
     def note(self, case: Case, sources: SourceHashes) -> None:
-        """Note that a case failed to the byte with these sources."""
+        """Note that a case failed to the byte with these sources, or raise SavingError."""
         key = _key(case)
         if self._known.get(key) == sources:
             return

@@ -57,7 +57,7 @@ class Replay:
 
 
 def system_of(case: Case, folder: Path) -> AnySystem:
-    """Return the landing system's class, imported as from ``folder``."""
+    """Return the landing system, imported as from ``folder``, or raise LandingSystemError."""
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
     try:
@@ -76,6 +76,7 @@ def replay(
     """Fly a case with its recorded moves, or with a ``live`` policy, and judge it.
 
     The tests in the file of the test that found it judge; without a test, the built-in verdict.
+    Raises GarlError if it cannot be flown, or if the test of a user's own property is not found.
     """
     found = _replay(case, folder, load_map(case.scenario.map, map_folders), live)
     if not case.of_another_engine:

@@ -151,7 +151,10 @@ def _planned_for_tests(target: str, maps: tuple[str, ...]) -> Iterator[tuple[Any
 
 
 def imported_system(name: str) -> AnySystem:
-    """Return a landing system, a class or a program, imported as from the current folder."""
+    """Return a landing system, a class or a program, imported as from the current folder.
+
+    Raises LandingSystemError if there is none of this name.
+    """
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
     from pytest_garl.execution.reference import system_named

@@ -55,7 +55,10 @@ class SettingsFile:
         return found.split() if isinstance(found, str) else [str(each) for each in found]
 
     def add(self, settings: Mapping[str, tuple[str, str]]) -> str:
-        """Add the settings that are missing; return in a word what was done."""
+        """Add the settings that are missing; return in a word what was done.
+
+        Raises GarlError if the file has no place for them, or cannot be read or written.
+        """
         missing = [key for key in settings if key not in self.values]
         if not missing:
             return "unchanged"

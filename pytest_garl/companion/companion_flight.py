@@ -94,7 +94,11 @@ def mission_facts(mission: Mission | None, camera: Camera) -> dict[str, object]:
 
 
 class CompanionFlight:
-    """A landing system: the program decides, the autopilot flies the motors."""
+    """A landing system: the program decides, the autopilot flies the motors.
+
+    Calls raise ProgramFailedError if the program fails, sends what is no finite number, or leaves
+    the vehicle without a link or a message.
+    """
 
     def __init__(self, start: Start, airframe: Airframe, vehicle: ArduCopter | Px4Copter) -> None:
         self._start, self._airframe, self._vehicle = start, airframe, vehicle
@@ -284,7 +288,10 @@ class CompanionProcess(ProgramProcess):
         self._ready.register(self._link, selectors.EVENT_READ)
 
     def exchange(self, until_s: float, frame: int, data: bytes, picture: Any) -> Answer:
-        """Give the program time and bytes; return what it did until it waits for more."""
+        """Give the program time and bytes; return what it did until it waits for more.
+
+        Raises ProgramFailedError if its process has ended, or wrote into the link between the two.
+        """
         self._write(b"G", struct.pack("!dI", until_s, frame) + data)
         while True:
             kind, answer = self._read()

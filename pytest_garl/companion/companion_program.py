@@ -44,6 +44,7 @@ class CompanionProgram(ProgramSystem):
     that it opens is not shown, instead of an error.  ``name`` is its id in ledgers, cases and
     baselines, by default that of the script.  ``sources`` are patterns of the files that decide how
     it flies, by default all in the script's folder; ``environment`` adds to that of pytest.
+    Raises LandingSystemError for a value that is not valid.
 
     It is made at the top level of a module::
 

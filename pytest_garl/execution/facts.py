@@ -86,7 +86,7 @@ class FailedFlightAssertion:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Facts:
-    """The facts in the database of a ledger, which lies at ``path``."""
+    """The facts in the database of a ledger at ``path``; a damaged one is a LedgerError."""
 
     database: Database
     path: Path

@@ -40,7 +40,10 @@ class FlownJob:
 
 
 def fly_and_save(job: FlightJob, scenario: Scenario, flight: FlightId, guard: Any) -> FlownJob:
-    """Fly, and save the record; that of an earlier attempt is removed first."""
+    """Fly, and save the record; that of an earlier attempt is removed first.
+
+    Raises LandingSystemError if this process cannot import the landing system.
+    """
     from pytest_garl.errors import NotFiniteError
     from pytest_garl.flight.flight_file import save
     from pytest_garl.simulation.system_under_test.takeover import with_takeover

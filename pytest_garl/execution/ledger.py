@@ -30,6 +30,7 @@ class Ledger:
     """A run's facts, searches, slots and results; several processes may use it at once.
 
     ``facts`` are about the run, ``queue`` hands out the slots, ``queries`` reads what was flown.
+    If the file cannot be made, read or written, that is a LedgerError.
     """
 
     def __init__(self, path: Path) -> None:

@@ -66,7 +66,7 @@ class Reference:
         return f"{self.module}:{self.qualname}"
 
     def load(self) -> Any:
-        """Return the object, imported by name, or from its file if the name fails."""
+        """Return the object, imported by name or else from its file; raise what that raises."""
         try:
             module = importlib.import_module(self.module)
             if self.file and Path(module.__file__ or "").resolve() != Path(self.file):

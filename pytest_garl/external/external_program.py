@@ -36,7 +36,8 @@ class ExternalProgram(ProgramSystem):
         lander = ExternalProgram(["./lander"], airframe=Airframe(camera=Camera(rate_hz=20)))
         pytestmark = pytest.mark.garl(system=lander)
 
-    ``docs/protocol.md`` says what the program reads and writes.
+    ``docs/protocol.md`` says what the program reads and writes.  Raises LandingSystemError for a
+    value that is not valid.
     """
 
     def __init__(
@@ -100,7 +101,10 @@ class ExternalProgram(ProgramSystem):
 
 
 class RunningProgram:
-    """The program in one flight; a further ``reset`` starts it anew."""
+    """The program in one flight; a further ``reset`` starts it anew.
+
+    ``reset`` and ``step`` raise ProgramFailedError if the program ends, or breaks the protocol.
+    """
 
     def __init__(self, program: ExternalProgram) -> None:
         self._program = program

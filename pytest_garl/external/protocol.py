@@ -115,7 +115,7 @@ def _camera(camera: Camera, hello: Hello) -> dict[str, Any]:
 
 
 def read_ready(line: bytes) -> None:
-    """Check the answer to ``reset``."""
+    """Check the answer to ``reset``; raise BadMessageError if it is another."""
     _only(_read(line, "ready"), (), "ready")
 
 

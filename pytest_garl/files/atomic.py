@@ -18,7 +18,10 @@ def write_text_atomically(path: Path, text: str) -> Path:
 
 
 def write_bytes_atomically(path: Path, content: bytes) -> Path:
-    """Write a file atomically and return its path; make its folder if it is missing."""
+    """Write a file atomically and return its path; make its folder if it is missing.
+
+    Raises SavingError if it cannot be written.
+    """
     incomplete = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -49,7 +52,10 @@ def check_writable(path: Path) -> None:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Lock a folder, so that one process at a time reads and then changes its files."""
+    """Lock a folder, so that one process at a time reads and then changes its files.
+
+    Raises SavingError if there is no such folder and none can be made.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         # The folder itself is locked: a file for the purpose would have to be ignored by git.

@@ -45,7 +45,10 @@ def read_bytes(
 def read_text(
     path: Path, limit: int = MEGABYTE, error: type[GarlError] = ScenarioError, hint: str = ""
 ) -> str:
-    """Return the UTF-8 text in a regular file of at most ``limit`` bytes, as it is."""
+    """Return the UTF-8 text in a regular file of at most ``limit`` bytes, as it is.
+
+    Raises ``error`` as :func:`read_bytes` does, and if it is not UTF-8.
+    """
     try:
         return read_bytes(path, limit, error, hint).decode()
     except UnicodeDecodeError as problem:

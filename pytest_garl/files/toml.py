@@ -53,7 +53,11 @@ def finite(value: object) -> float | None:
 
 
 class Table:
-    """One TOML table with its file and its path of keys, which the error messages name."""
+    """One TOML table with its file and its path of keys.
+
+    Methods that read raise ScenarioError that names both, for a missing key without default, for a
+    value of another type, and for one beyond the limits given.
+    """
 
     def __init__(self, values: Any, source: str, path: str = "") -> None:
         self.source, self.path = source, path

@@ -187,7 +187,10 @@ def load_baseline(path: Path, search_path: tuple[Path, ...] = ()) -> Baseline:
 
 
 def save_baseline(path: Path, baseline: Baseline) -> None:
-    """Write the file atomically; an existing one is replaced."""
+    """Write the file atomically; an existing one is replaced.
+
+    Raises BaselineError for a baseline that could not be read again, as one that is too large.
+    """
     _check(baseline, lambda problem: BaselineError(f"{path}: {problem}"))
     text = dump_baseline(baseline)
     if len(text.encode()) > LARGEST_BYTES:

@@ -74,6 +74,7 @@ def director_of(text: str) -> Director:
 
     Empty: the weights that ship.  ``time-to-go 0.5 1``: that rule, with its margin and its time
     after an unseen UAV passed 3 m.  Else the weights of a network, as ``Network.text`` gives them.
+    Raises PolicyError for a text that names none.
     """
     from pytest_garl.npcs.learned import learned_director, network_from
 

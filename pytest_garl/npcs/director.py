@@ -76,7 +76,10 @@ NEAR_M = 3.0
 
 
 class Watch:
-    """What one NPC that waits knows of the UAV, as the numbers that a director decides on."""
+    """What one NPC that waits knows of the UAV, as the numbers that a director decides on.
+
+    Raises ValueError if its story has no grade of :data:`GRADES`.
+    """
 
     def __init__(self, situation: Situation, story: Story | None = None) -> None:
         found = story or story_of(situation.scenario, situation.self.name)

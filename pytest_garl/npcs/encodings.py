@@ -104,7 +104,8 @@ def relative(situation: Situation) -> State:
 def belief(situation: Situation) -> State:
     """Return twelve numbers: ``relative`` to where the UAV is believed to be, and two of the grade.
 
-    These are how long the NPC still interferes, and whether it keeps away from the UAV.
+    These are how long the NPC still interferes, and whether it keeps away from the UAV.  Raises
+    TypeError for a situation that is no ``Belief``.
     """
     if not isinstance(situation, Belief):
         raise TypeError(f"expected a Belief, found {type(situation).__name__}")

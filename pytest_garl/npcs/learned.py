@@ -93,7 +93,10 @@ def network_from(text: str, state: str = WAITING) -> Network:
 
 
 class LearnedPolicy:
-    """Takes the action with the highest value; one instance moves one NPC."""
+    """Takes the action with the highest value; one instance moves one NPC.
+
+    Raises PolicyError if the file is missing or damaged, or has another hash.
+    """
 
     def __init__(self, weights: str, sha256: str) -> None:
         self._network = _load(weights, sha256)
@@ -118,7 +121,8 @@ def shipped(grade: str) -> str:
 class LearnedMind:
     """The mind of an NPC that perceives the UAV in part: the best action by weights in a file.
 
-    Without a hash the one in the manifest holds.
+    Without a hash the one in the manifest holds.  Raises PolicyError if the file is missing or
+    damaged, or has another hash.
     """
 
     def __init__(self, weights: str, sha256: str = "") -> None:

@@ -36,7 +36,7 @@ class Recorded:
         self._changes: dict[str, list[tuple[int, str, float]]] = json.loads(changes)
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
-        """Begin with the first move."""
+        """Begin with the first move; raise PolicyError if the NPC has no recorded moves."""
         name = situation.self.name
         if name not in self._all:
             raise PolicyError(

@@ -147,7 +147,7 @@ def options_of(config: pytest.Config) -> Options:
 
 
 def read_options(config: pytest.Config) -> Options:
-    """Read the options; call ``options_of``, which does it once."""
+    """Read the options, or raise UsageError; call ``options_of``, which does it once."""
     text = {option.name: _value(config, option) for option in OPTIONS}
     of_controller = getattr(config, "workerinput", {})
     budget = _integer("budget", text["budget"], 1) if text["budget"] else 0

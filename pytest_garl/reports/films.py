@@ -100,7 +100,7 @@ def draw_films(
     """Draw films in ``workers`` processes; return for each why it was not drawn, or nothing.
 
     All films lie in one folder, which is made.  A film is there whole or not at all, also if this
-    process is interrupted.
+    process is interrupted.  Raises SavingError if the folder cannot be made.
     """
     if not tasks:
         return []

@@ -63,7 +63,10 @@ def encode(scenario: Scenario, genome: Genome) -> NDArray[np.float64]:
 
 
 def decode(vector: NDArray[np.float64], genome: Genome, *, map: str, seed: int) -> Scenario:
-    """Return the scenario that a chromosome, (number of genes,), stands for."""
+    """Return the scenario that a chromosome, (number of genes,), stands for.
+
+    Raises ScenarioError for another shape, and for a gene beyond its range.
+    """
     row = dict(
         zip(genome.keys, _checked(np.asarray(vector, dtype=np.float64), genome), strict=True)
     )

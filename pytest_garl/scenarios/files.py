@@ -99,7 +99,10 @@ SCENARIO_KEYS = ("absent", "genes", "scenario", "task")
 
 
 def read_scenario(top: Table, map: Map) -> Scenario:
-    """Return the scenario in a document's ``scenario``, or in its ``genes`` and ``absent``."""
+    """Return the scenario in a document's ``scenario``, or in its ``genes`` and ``absent``.
+
+    Raises ScenarioError that names source and key.
+    """
     if "genes" in top.values and "scenario" in top.values:
         raise top.error("genes", "found tables 'genes' and 'scenario', expected one of them")
     if "genes" in top.values:

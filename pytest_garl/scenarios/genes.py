@@ -75,7 +75,7 @@ class Genome:
 
     ``task``, the values ``fixed``, by key, and the objects of the map that are ``removed`` are
     what its scenarios have in common.  In scenarios of a dense genome all optional genes may act,
-    and act when drawn, instead of at most three.
+    and act when drawn, instead of at most three.  Raises ScenarioError if a key occurs twice.
     """
 
     composites: tuple[CompositeGene, ...]

@@ -303,7 +303,8 @@ class Placed:
         """Where the UAV is at the start, (x, y, height of its feet or of a hovering body).
 
         A hover begins at the nearest place that is 2 m clear of every static body, because an error
-        of the mission's coordinate may put the start into a tree.
+        of the mission's coordinate may put the start into a tree.  Raises ScenarioError if none
+        is clear.
         """
         start = self.scenario.task.start
         if not start.hovers:

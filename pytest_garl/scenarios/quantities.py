@@ -45,7 +45,8 @@ class Quantity:
     one half of the draws of a sparse genome lie in the third that is farthest from nominal.
     One that ``acts_alone`` may matter without the other values of its group, as how a pad lies
     turned.  ``scale`` is "inverse" for a visibility, whose effect grows with 1 / value: it is
-    strongest at ``low``, and infinite without effect.
+    strongest at ``low``, and infinite without effect.  Raises ScenarioError unless
+    ``low <= nominal <= high`` and ``low < high``.
     """
 
     key: str

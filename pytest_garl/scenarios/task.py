@@ -98,7 +98,10 @@ def _nested_text(marker: NestedMarker) -> str:
 
 
 def read_task(top: Table) -> Task:
-    """Return the task in a document's table ``task``; what it does not state is the default."""
+    """Return the task in a document's table ``task``; what it does not state is the default.
+
+    Raises ScenarioError that names source and key.
+    """
     if "task" not in top.values:
         return DEFAULT_TASK
     table = top.table("task")

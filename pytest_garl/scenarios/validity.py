@@ -49,7 +49,7 @@ def repair(scenario: Scenario, map: Map) -> Scenario:
 
     Its values are those that a file can write.  A valid scenario of such values comes back
     unchanged.  The marker is repaired first, then the objects in order, each against what is
-    settled already.
+    settled already.  Raises ScenarioError if the map leaves no room.
     """
     scenario = snapped(scenario, map)
     discs = _discs_on(map)

@@ -31,7 +31,10 @@ class MethodProcess(AskedProcess):
 
 
 class SeparateMethod:
-    """A search by a shipped method, of which only the texts of its scenarios are known here."""
+    """A search by a shipped method, of which only the texts of its scenarios are known here.
+
+    Calls raise GarlError if the method does, and PoolError if its process has ended.
+    """
 
     def __init__(self, process: MethodProcess, search: str, name: str, plan: SearchPlan) -> None:
         self._process, self._search = process, search

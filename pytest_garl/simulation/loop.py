@@ -156,7 +156,10 @@ class Loop:
         return not self._contacts.settling(self._ticks / PHYSICS_RATE_HZ, self._time_limit_s)
 
     def tick(self) -> Outcome | None:
-        """Advance by 1/240 s; return the outcome once there is one."""
+        """Advance by 1/240 s; return the outcome once there is one.
+
+        Raises SystemFailedError if the landing system fails, or the UAV's state is not finite.
+        """
         tick = self._ticks
         if self.out_of_time:
             self.recorder.event("time_out", f"not landed after {self._time_limit_s:g} s")

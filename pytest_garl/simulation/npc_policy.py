@@ -169,6 +169,7 @@ class PolicySpec:
     """Names a policy so that a worker process can make it and a ledger can compare it.
 
     ``factory`` is "module:attribute", called with ``arguments`` as keyword arguments for each NPC.
+    Whatever imports it raises PolicyError if that fails.
     """
 
     name: str

@@ -59,7 +59,7 @@ def kinds_in_a_draw(counts: Sequence[int], flights: int, drawn: int) -> NDArray[
 
     Shape (kinds + 1,).  Each flight shows one kind or none.  Each kind takes a binomial number of
     its flights, and so do the flights without a violation; given that these are ``drawn`` in all,
-    every draw is equally probable.
+    every draw is equally probable.  Raises ValueError if more are to be drawn than there are.
     """
     from scipy.stats import binom
 

@@ -78,7 +78,7 @@ class Limits:
     ``distance_m`` is half the marker's side, and at least 0.3 m: the UAV stands on the marker.
     ``time_s`` is 120, the Wingcopter's two minutes in multi-copter mode (paper).  ``abort`` says
     when a landing that is given up is a violation: "needless" unless nobody could have landed,
-    "violation" always, "ok" never.
+    "violation" always, "ok" never.  Raises OptionError for a limit out of range, or another rule.
     """
 
     distance_m: float = default_distance_m(MARKER_SIDE_M)

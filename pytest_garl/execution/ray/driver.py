@@ -99,7 +99,8 @@ def joined_cluster(
 ) -> Iterator[tuple[Any, ActorWorkspace, int]]:
     """Join a cluster for as long as the block lasts, and give it a copy of the project at ``root``.
 
-    Files that git ignores are not copied, nor is ``folder``, which holds the flights.
+    Files that git ignores are not copied, nor is ``folder``, which holds the flights.  Raises
+    PoolError.
     """
     root, folder, here = root.resolve(), folder.resolve(), Path.cwd()
     excludes = [f"/{folder.relative_to(root)}"] if folder.is_relative_to(root) else []

@@ -53,7 +53,8 @@ class Link:
     """The link of one flight; ``mission`` is the task, as the protocol describes it.
 
     ``frame`` is "ENU" (and FLU) or "NED" (and FRD), for all values read and sent.  ``reads`` names
-    the data that the program uses: "image", "depth_m", "rangefinder_m".
+    the data that the program uses: "image", "depth_m", "rangefinder_m".  Raises RuntimeError for
+    a message that the protocol forbids, and for a frame without a command or with two.
     """
 
     def __init__(self, frame: str = "ENU", reads: Sequence[str] = ("image",)) -> None:

@@ -34,7 +34,10 @@ DOMAINS = 100
 
 
 def main(words: list[str]) -> None:
-    """Start the node, and pass frames and commands until the flight or the node ends."""
+    """Start the node, and pass frames and commands until the flight or the node ends.
+
+    Raises SystemExit with the usage if no command is given.
+    """
     speed_mps = 3.0
     if words and words[0].startswith("--speed="):
         speed_mps = float(words.pop(0).partition("=")[2])
@@ -52,7 +55,10 @@ def main(words: list[str]) -> None:
 
 
 def choose_domain() -> None:
-    """Take a ROS domain that no other flight of this machine has, until this process ends."""
+    """Take a ROS domain that no other flight of this machine has, until this process ends.
+
+    Raises SystemExit if all are in use.
+    """
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     for domain in range(1, DOMAINS + 1):
         name = Path(tempfile.gettempdir(), f"garl-ros-domain-{domain}")

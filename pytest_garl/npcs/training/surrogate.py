@@ -89,7 +89,7 @@ class SurrogateEnv(OneNpcEnv):
         return self._observe()
 
     def step(self, action: np.int64) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Move the NPC for 0.5 s."""
+        """Move the NPC for 0.5 s; raise ResetNeeded before the first ``reset``."""
         episode = self._current()
         if episode.outcome is not None:
             observation, info = self._observe()
@@ -141,7 +141,10 @@ class GradedEnv(OneNpcEnv):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Draw episodes until the NPC of one perceives the UAV; the same seed draws the same."""
+        """Draw episodes until the NPC of one perceives the UAV; the same seed draws the same.
+
+        Raises RuntimeError if 100 episodes are in vain.
+        """
         super().reset(seed=seed)
         for _ in range(_TRIES):
             self.close()
@@ -157,7 +160,10 @@ class GradedEnv(OneNpcEnv):
         return self.follow(self._encoding.moves(self.belief)[int(action)])
 
     def follow(self, move: Move) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Let the NPC make a move, which need not be an action, until its next decision."""
+        """Let the NPC make a move, which need not be an action, until its next decision.
+
+        Raises ResetNeeded before the first ``reset``.
+        """
         episode, before = self._current(), self._distance_m()
         self._interference.answer(move)
         goes_on = self._fly_to_decision()

@@ -34,7 +34,7 @@ def fail_report(report: pytest.TestReport, error: GarlError) -> None:
 
 
 def abort_if_fatal(record: ItemRecord) -> None:
-    """End the session if an item says that it cannot go on."""
+    """End the session, by raising pytest's ``Exit``, if an item says that it cannot go on."""
     if record.fatal:
         raise pytest.exit.Exception(f"garl: {record.fatal}", pytest.ExitCode.INTERNAL_ERROR)
 

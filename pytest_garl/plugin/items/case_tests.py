@@ -36,7 +36,10 @@ class _Collector:
 
 
 def case_setup(case: Case, root: Path) -> CaseSetup:
-    """Return how the tests that found a case fly and judge it."""
+    """Return how the tests that found a case fly and judge it.
+
+    Raises GarlError if they cannot be collected, or lack the test of a user's own property.
+    """
     if not case.test:
         return CaseSetup()
     collector = _Collector()

@@ -48,6 +48,7 @@ def collect_project(root: Path, cases: Path | None) -> ProjectTests:
 
     ``cases`` is the folder of the saved cases; None for that of the ini key.  A file that cannot
     be collected beside the others, such as a second one of the same name, is collected alone.
+    Raises GarlError if pytest itself fails.
     """
     found = _collect(root, cases, ())
     if len(found.collection.test_files) + len(found.broken) < 2:

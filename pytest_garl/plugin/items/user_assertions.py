@@ -25,7 +25,8 @@ _AVAILABLE = {"landing", "scenario"}
 def collect_assertion(session: pytest.Session, nodeid: str) -> tuple[Target, ItemAssertion]:
     """Return target and assertion of a test that an xdist worker ran.
 
-    The controller has collected nothing, so the test's file is collected here.
+    The controller has collected nothing, so the test's file is collected here.  Raises GarlError
+    if the file does not have the test.
     """
     path = session.config.rootpath / nodeid.partition("::")[0]
     nodes: list[Any] = [pytest.Module.from_parent(session, path=path)]

@@ -76,7 +76,8 @@ class Searches:
     def register(self, system: AnySystem, npcs: PolicySpec | None) -> None:
         """Put all searches of a landing system into the ledger.
 
-        Without a policy the NPCs of each search move as its domain says.
+        Without a policy the NPCs of each search move as its domain says.  Raises LedgerError if two
+        sets of tests fly the same search differently, PolicyError for a policy that is none.
         """
         for search, wanted in self.targets.items():
             sample = next(iter(wanted.values()))

@@ -57,7 +57,10 @@ def no_picture(path: Path) -> GarlError:
 
 
 def encode(command: Sequence[str], pictures: Iterable[Image], path: Path) -> None:
-    """Let ffmpeg read pictures from its standard input; errors name ``path``."""
+    """Let ffmpeg read pictures from its standard input.
+
+    Raises GarlError, which names ``path``, if they differ in size or ffmpeg fails.
+    """
     shape = None
     with tempfile.TemporaryFile() as said:
         with subprocess.Popen(

@@ -22,7 +22,7 @@ _Number = TypeVar("_Number", np.float32, np.int32)
 class Lens:
     """The lens of a camera; ``pinhole`` is the camera that sees all that it shows.
 
-    Both have the same focal length.
+    Both have the same focal length.  Raises GarlError if the distortion folds back in the picture.
     """
 
     def __init__(self, camera: Camera) -> None:

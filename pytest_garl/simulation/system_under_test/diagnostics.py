@@ -45,7 +45,8 @@ class DiagnosticsQuota:
     def shorten(self, diagnostics: Diagnostics, field: str) -> Diagnostics:
         """Return the diagnostics to record.
 
-        Once a quarter of the quota is used, these are only what verdicts need.
+        Once a quarter of the quota is used, these are only what verdicts need.  Once it is used
+        up, raises NonsenseError.
         """
         if self._left < (1 - FULL_SHARE) * MAX_DIAGNOSTICS_BYTES:
             diagnostics = dataclasses.replace(

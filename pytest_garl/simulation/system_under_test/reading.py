@@ -38,7 +38,10 @@ def number(
 def numbers(
     value: object, field: str, count: int, most: float = math.inf, unit: str = ""
 ) -> tuple[float, ...]:
-    """Return ``count`` finite Python floats of any sequence, none beyond ``most`` or ``-most``."""
+    """Return ``count`` finite Python floats of any sequence, none beyond ``most`` or ``-most``.
+
+    Raises NonsenseError for anything else.
+    """
     found = [finite(item) for item in items(value, count) or ()]
     if len(found) != count or None in found:
         raise NonsenseError(f"{field} = {shown_foreign(value)}; expected {count} finite numbers")
