@@ -69,7 +69,8 @@ class ArduCopter:
     ``parameters`` are ArduPilot's, by name and in its units (``{"PLND_ENABLED": 1, "LAND_SPEED":
     30}``).  ``pilot`` is the mode into which a human pilot switches: with "LAND" the pilot takes
     off, flies to the mission's coordinate at the search altitude, waits there and switches, for
-    programs that only help ArduPilot to land; by default the program does all of it.
+    programs that only help ArduPilot to land; by default the program does all of it.  Raises
+    LandingSystemError for another mode, a parameter that nothing here reads, and a bad value.
     """
 
     parameters: Mapping[str, float] = field(default_factory=dict)

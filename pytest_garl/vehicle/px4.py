@@ -76,7 +76,8 @@ class Px4Copter:
 
     ``parameters`` are PX4's (``{"COM_OBL_RC_ACT": 4}``).  ``pilot`` is the mode into which a human
     pilot switches after a take-off and a flight to the mission's coordinate: "LAND" stands for
-    AUTO.PRECLAND.
+    AUTO.PRECLAND.  Raises LandingSystemError for a parameter that is not simulated, and for a value
+    that is not finite.
     """
 
     parameters: Mapping[str, float] = field(default_factory=dict)
