@@ -23,7 +23,8 @@ class Detection:
     """One marker that the landing system believes to see.
 
     ``position_m`` is the estimate of its centre in the world frame; ``corners_px`` are
-    (u, v) pairs clockwise from the top left.
+    (u, v) pairs clockwise from the top left.  ``confidence`` is any finite number, by custom from
+    0 to 1; reports show it.
     """
 
     marker_id: int

@@ -56,7 +56,7 @@ Changes = tuple[tuple[str, ChangeList], ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Violation:
-    """A violated property, its measured margin (negative or 0), and a description in words."""
+    """A violated property, its margin in ``unit`` (negative or 0), and a description in words."""
 
     signature: str
     type: ViolationType
@@ -70,8 +70,9 @@ class Violation:
 class Worst:
     """The worst violation of a kind in the search that saved its case: the bound of its excuse.
 
-    ``margin`` is that of the violated property, ``grade`` the weakest adversary; each may be of
-    another flight.  A grade is empty for violations without a moving body, and if nobody knows it.
+    ``margin`` is that of the violated property, in its unit, ``grade`` the weakest adversary; each
+    may be of another flight.  A grade is empty for violations without a moving body, and if nobody
+    knows it.
     """
 
     margin: float

@@ -36,7 +36,7 @@ class SearchProgress:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightSeconds:
-    """Mean wall times of flights; 0 without such flights."""
+    """Mean wall times of flights in seconds; 0 without such flights."""
 
     of_search: float
     plain: float

@@ -16,7 +16,10 @@ ROUNDING = 9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RelativeLimit:
-    """By how much a landing may be worse than its base: by ``share`` of it, or by ``least``."""
+    """By how much a landing may be worse than its base: by ``share`` of it, or by ``least``.
+
+    Values are in ``unit``.
+    """
 
     what: Literal["distance", "time"]
     unit: str

@@ -211,7 +211,7 @@ class KindRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """The median and the worst, which is the largest, of a quantity over flights that landed."""
+    """The median and the worst (largest) of a quantity over flights that landed, in its unit."""
 
     median: float
     worst: float

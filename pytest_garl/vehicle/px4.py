@@ -113,7 +113,7 @@ class Px4Parameters(Parameters):
         yield from sorted(self._named.items())
 
     def set(self, name: str, value: float) -> None:
-        """Take a value."""
+        """Take a value in PX4's unit."""
         self._named[name] = float(value)
         self._act(name, value)
 

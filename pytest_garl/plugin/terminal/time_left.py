@@ -76,7 +76,7 @@ class TimeLeft:
         self._remaining_since = self._flown_then = 0.0
 
     def forecast(self, ledger: Ledger, now: float) -> Forecast:
-        """Return what is left at the time ``now``; the first call starts the clock."""
+        """Return what is left at the time ``now``, in seconds; the first call starts the clock."""
         flown = ledger.queries.meters()
         after, flying_s = flown.get("on_demand", 0.0), flown.get("flying_s", 0.0)
         if self._began is None:

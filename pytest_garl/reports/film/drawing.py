@@ -52,13 +52,13 @@ def area(image: Image, points: NDArray[Any], colour: Colour) -> None:
 
 
 def disc(image: Image, at: Point, radius: float, colour: Colour, thickness: int = -1) -> None:
-    """Draw a filled disc, or a circle where ``thickness`` is positive."""
+    """Draw a disc, or a circle where ``thickness`` is positive; all lengths are in pixels."""
     x, y = (round(value * 2**_SHIFT) for value in at)
     cv2.circle(image, (x, y), round(radius * 2**_SHIFT), colour, thickness, cv2.LINE_AA, _SHIFT)
 
 
 def cross(image: Image, at: Point, reach: float, colour: Colour, thickness: int = 3) -> None:
-    """Draw a diagonal cross."""
+    """Draw a diagonal cross that reaches as many pixels to each side."""
     x, y = at
     for rise in (reach, -reach):
         ends = np.array([[x - reach, y - rise], [x + reach, y + rise]])

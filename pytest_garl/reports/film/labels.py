@@ -11,7 +11,10 @@ Box = tuple[float, float, float, float]
 
 
 class Labels:
-    """The names in one picture; ``keep_clear`` of all things before the first ``write``."""
+    """The names in one picture; ``keep_clear`` of all things before the first ``write``.
+
+    Places and radii are in pixels.
+    """
 
     def __init__(self, image: drawing.Image) -> None:
         self._image = image

@@ -21,7 +21,7 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
-    """A part of a bar: its class in the style sheet, where it lies, what it says."""
+    """A part of a bar that is ``SIDE`` long: its class in the style sheet, place and text."""
 
     kind: str
     left: float

@@ -47,7 +47,7 @@ def stamp(time_ns: int) -> Timestamp:
 
 
 def colour(rgb: Sequence[float], opacity: float = 1.0) -> Color:
-    """Return a colour of red, green and blue from 0 to 255."""
+    """Return a colour of red, green and blue from 0 to 255, with an opacity from 0 to 1."""
     r, g, b = (value / 255 for value in rgb)
     return Color(r=r, g=g, b=b, a=opacity)
 

@@ -28,7 +28,7 @@ _SHIFT = 4
 
 
 class Canvas:
-    """Draws shapes in world coordinates onto an image of the ground within ``bounds_m``."""
+    """Draws shapes in the world, in metres, onto an image of the ground within ``bounds_m``."""
 
     def __init__(self, image: Image, bounds_m: Bounds, m_per_px: float) -> None:
         self.image, self.bounds_m, self.m_per_px = image, bounds_m, m_per_px

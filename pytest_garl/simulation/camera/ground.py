@@ -36,7 +36,7 @@ class Raster:
 
     Levels have four channels, of which the last is unused: they are warped faster so.
 
-    Row 0 lies at ``y_max``, column 0 at ``x_min`` (pixel edges).
+    Row 0 lies at ``y_max``, column 0 at ``x_min`` (pixel edges, in metres).
     """
 
     levels: tuple[Image, ...]

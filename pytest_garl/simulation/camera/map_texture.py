@@ -139,7 +139,7 @@ def _patches(
 
 
 def detail(map: Map, bounds_m: Bounds, resolution: float) -> Image:
-    """Enlarge a square piece of a map and add the grain that its picture cannot hold."""
+    """Enlarge a piece of a map to ``resolution`` (metres a pixel) and add the grain it lacks."""
     painted, wide_box = picture(map), bounds_of(map)
     size = round((bounds_m[1] - bounds_m[0]) / resolution)
     zoom = resolution / RESOLUTION_M

@@ -34,7 +34,7 @@ def eye_under(position_m: Vector, attitude: Quaternion, offset_m: Vector = BELLY
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """A camera at ``eye`` (3,) with ``axes`` (3, 3): rows right, down and forward."""
+    """A camera at ``eye`` (3,), in metres, with ``axes`` (3, 3): rows right, down and forward."""
 
     camera: Camera
     eye: NDArray[np.float64]
@@ -104,7 +104,7 @@ class View:
         )
 
     def shows(self, x: float, y: float, z: float, radius_m: float) -> bool:
-        """Whether a ball at camera-frame (x, y, z) touches the view's pyramid."""
+        """Whether a ball at camera-frame (x, y, z), in metres, touches the view's pyramid."""
         reach_x, reach_y = self.reach
         return (
             -radius_m <= z <= FAR_M
