@@ -17,7 +17,8 @@ of precision landing, arming checks, and ``SMAX``, ``PDMX``, ``D_FF`` of the PID
 
 The rate: ArduPilot runs at 400 Hz.  Declare 240 Hz, the rate of the simulator's physics; filter
 coefficients follow from it, and 120 Hz flies as well.  Frames are the project's: z up, y left,
-headings counter-clockwise from east, where ArduPilot has north, east, down.
+headings counter-clockwise from east, where ArduPilot has north, east, down.  Values are in metres,
+seconds and radians, throttles from 0 to 1.
 
     control = ArduPilotControl(Airframe(control_rate_hz=240), parameters)
     control.take_off(10.0)

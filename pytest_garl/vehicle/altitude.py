@@ -17,7 +17,7 @@ THROTTLE_PER_MPS2 = 0.1
 
 
 class VerticalControl:
-    """Follows a shaped target height and returns the throttle of a level vehicle."""
+    """Follows a shaped target height (m, s) and returns the throttle of a level vehicle."""
 
     def __init__(self, parameters: ArduPilotParameters, dt_s: float) -> None:
         p = parameters

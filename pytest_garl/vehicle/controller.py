@@ -33,7 +33,8 @@ class ArduPilotControl:
     """Flies a quadrotor as ArduPilot Copter does; see the package's docstring.
 
     Call ``control`` once per 1 / ``airframe.control_rate_hz`` from the first moment on, and
-    the orders ``take_off``, ``guide``, ``land``, ``landing_target`` at any time between.
+    the orders ``take_off``, ``guide``, ``land``, ``landing_target`` at any time between.  Raises
+    ValueError for an airframe without this rate.
     """
 
     def __init__(self, airframe: Airframe, parameters: ArduPilotParameters | None = None) -> None:

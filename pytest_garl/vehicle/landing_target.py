@@ -25,7 +25,10 @@ ARDUPILOT_RATE_HZ = 400.0
 
 
 class AxisFilter:
-    """A Kalman filter with two states, position and velocity, driven by white acceleration."""
+    """A Kalman filter with position (m) and velocity (m/s), driven by white acceleration.
+
+    Variances are in m².
+    """
 
     def __init__(self, acceleration_noise_mps2: float, position: float, variance: float) -> None:
         self._density = acceleration_noise_mps2**2 / ARDUPILOT_RATE_HZ
@@ -124,7 +127,10 @@ class LandingTarget:
         return self._acquired
 
     def place(self, time_s: float) -> Pair:
-        """Return the estimate at a time not before the last measurement; only while found."""
+        """Return the estimate (x, y) in m, at a time not before the last measurement.
+
+        Raises ValueError if no target was measured; ask ``found`` first.
+        """
         if self._x is None or self._y is None or self.measured_s is None:
             raise ValueError("no landing target was measured yet; ask found() first")
         ahead = max(0.0, time_s - self._filtered_s)

@@ -62,7 +62,7 @@ class MotorOutput:
         top: float,
         calm: bool,
     ) -> MotorThrusts:
-        """Return the thrusts for a horizontal acceleration, a throttle and a heading.
+        """Return the thrusts for a horizontal acceleration, a throttle and a heading in radians.
 
         ``top`` is the most that the spool allows; ``calm`` tells that the vehicle comes down
         without feeling anything, so that throttle goes before attitude.

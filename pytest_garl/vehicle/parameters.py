@@ -32,7 +32,10 @@ class RatePid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArduPilotParameters:
-    """Parameters that an operator of ArduPilot can set; the defaults are ArduPilot's."""
+    """Parameters that an operator of ArduPilot can set; the defaults are ArduPilot's.
+
+    Raises ValueError for a mode of precision landing that ArduPilot does not have.
+    """
 
     psc_posxy_p: float = 1.0
     """1/s."""

@@ -9,8 +9,8 @@ class Pid:
     """Proportional, integral and derivative of a filtered error; plain floats.
 
     Filters as in ArduPilot: the target, the error and the derivative of the filtered error
-    each have a first-order low-pass.  The integral stays within ``imax`` and, while the output
-    is limited, may only shrink.
+    each have a first-order low-pass with a cut-off in Hz; 0 is off.  The integral stays within
+    ``imax`` and, while the output is limited, may only shrink.
     """
 
     def __init__(

@@ -39,14 +39,14 @@ def sqrt_controller(p: float, limit: float) -> Rate:
 
 
 def stopping_distance(speed: float, p: float, limit: float) -> float:
-    """Return the error at which :func:`sqrt_controller` asks for ``speed``: its inverse."""
+    """Return the error (m) at which :func:`sqrt_controller` asks for ``speed`` (m/s)."""
     if speed <= limit / p:
         return speed / p
     return limit / (2 * p * p) + speed * speed / (2 * limit)
 
 
 class ShapedAxis:
-    """A target on one axis that moves with bounded speed, acceleration and jerk.
+    """A target on one axis that moves with bounded speed, acceleration and jerk; m and s.
 
     Nested square-root controllers: velocity to acceleration with the jerk, and position to
     velocity slower and softer than that, so that the loop inside can follow.
@@ -79,7 +79,7 @@ class ShapedAxis:
 
 
 class ShapedPlane:
-    """The same in the horizontal plane, on lengths, so that a diagonal is no faster."""
+    """The same in the horizontal plane (m, s), on lengths, so that a diagonal is no faster."""
 
     def __init__(self, acceleration_max: float, jerk: float, dt_s: float) -> None:
         self._acceleration_max, self._jerk, self._dt = acceleration_max, jerk, dt_s

@@ -29,7 +29,7 @@ def descent_rate(height_m: float, parameters: ArduPilotParameters) -> float:
 def descent_rate_over_target(
     rate: float, height_m: float, error_m: float, parameters: ArduPilotParameters
 ) -> float:
-    """Return the climb rate of a landing that sees its target ``error_m`` aside.
+    """Return the climb rate in m/s of a landing that sees its target ``error_m`` aside.
 
     None beyond ``PLND_XY_DIST_MAX`` (0 switches that off), slow near the ground.
     """

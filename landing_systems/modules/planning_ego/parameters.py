@@ -13,7 +13,10 @@ from dataclasses import dataclass, fields
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EgoParameters:
-    """All settings of the planner, checked when built; lengths in metres, times in seconds."""
+    """All settings of the planner; lengths in metres, times in seconds.
+
+    Raises ValueError for a value that is no number, or beyond its limits.
+    """
 
     # Motion
     max_vel_mps: float = 2.0

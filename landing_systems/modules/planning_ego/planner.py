@@ -94,7 +94,10 @@ class EgoPlanner:
         )
 
     def set_goal(self, goal_m: Vector) -> None:
-        """Say where to fly; a goal within ``goal_change_m`` of the present one is the same."""
+        """Say where to fly; a goal within ``goal_change_m`` of the present one is the same.
+
+        Raises ValueError if the goal is not finite.
+        """
         goal = np.array(goal_m, float)
         if not np.isfinite(goal).all():
             raise ValueError(f"the goal is {goal_m}; expected three finite numbers")

@@ -17,6 +17,7 @@ class RayCaster:
     A miss changes only a cell that was hit before: all others are at the lower clamp
     already.  So instead of walking along each ray through thousands of cells that are
     known to be free, the ray through each cell in question is looked up in the image.
+    Raises ValueError if the margin of pixels leaves no ray.
     """
 
     def __init__(self, camera: Camera, parameters: EgoParameters) -> None:
@@ -42,7 +43,8 @@ class RayCaster:
     def hits(self, depth_m: NDArray[np.float32], eye_m: Floats, rotation: Floats) -> Floats:
         """Return where rays end on something (n, 3), above the ground and within range.
 
-        ``eye_m`` is the camera's place, ``rotation`` (3, 3) turns body into world vectors.
+        ``eye_m`` is the camera's place, ``rotation`` (3, 3) turns body into world vectors.  Raises
+        ValueError if the depth image has not the camera's shape.
         """
         p = self._p
         shape = self._camera.height_px, self._camera.width_px

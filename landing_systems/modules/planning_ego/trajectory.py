@@ -23,7 +23,8 @@ def escape_distance(
 ) -> tuple[float, Array | None]:
     """Return how far around a place (3,) occupancy does not count, and the free place to leave to.
 
-    That is 0 and None where the place is free; else the nearest free cell decides.
+    That is 0 and None where the place is free; else the nearest free cell decides.  Raises
+    NoTrajectoryError if no cell near by is free.
     """
     if not grid.occupied(place[None])[0]:
         return 0.0, None
