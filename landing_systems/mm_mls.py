@@ -8,6 +8,8 @@ import math
 from collections import deque
 from collections.abc import Callable
 
+import numpy as np
+
 from landing_systems.modules.decision import Decision, DecisionModule, DecisionParameters
 from landing_systems.modules.detection_tphyolo.detector import TphYoloDetector
 from landing_systems.modules.movement_watch import MovementWatch
@@ -47,6 +49,9 @@ PATIENCE = 1 / 3
 """Having waited for this share of its time limit for a place that is not free, it goes home."""
 BELOW_SEARCH_M = 0.3
 """Lower than the height of the search by this, it makes way; that height is where it waits."""
+REPORTED_M, REPORTED = 2.0, 30
+"""How near its way an obstacle is reported, and how many cells are: a dog is a dozen, and a record
+has room for 30 in each of 1,200 frames."""
 
 Vector = tuple[float, float, float]
 
@@ -120,7 +125,12 @@ class MultiModuleLandingSystem:
         note = str(plan.error or decision.note)
         return PositionSetpoint(
             position_m=plan.position_m,
-            diagnostics=decision.diagnostics(seen, path=plan.path_m, note=note),
+            diagnostics=decision.diagnostics(
+                seen,
+                path=plan.path_m,
+                note=note,
+                obstacles=self._obstacles((x, y, z), decision.goal_m),
+            ),
         )
 
     def control(self, state: VehicleState) -> MotorThrusts:
@@ -160,7 +170,14 @@ class MultiModuleLandingSystem:
         self._decision.interrupt()
         refuge = (at[0], at[1], max(at[2], self._mission.search_altitude_m))
         self._later(now, functools.partial(self._control.guide, position=refuge, yaw=0.0))
-        note = "something is in the way below"
+        note, obstacles = "something is in the way below", self._obstacles(at, decision.goal_m)
         return PositionSetpoint(
-            position_m=refuge, diagnostics=decision.diagnostics(seen, note=note)
+            position_m=refuge,
+            diagnostics=decision.diagnostics(seen, note=note, obstacles=obstacles),
         )
+
+    def _obstacles(self, at: Vector, goal: Vector) -> tuple[Vector, ...]:
+        """Return what the planner takes for solid near the straight way, for the record."""
+        start, end = np.array(at[:2]), np.array(goal[:2])
+        found = self._planner.grid.obstacles_beside(start, end, REPORTED_M, REPORTED)
+        return tuple((x, y, z) for x, y, z in found.tolist())

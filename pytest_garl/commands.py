@@ -39,11 +39,12 @@ class Diagnostics:
 
     ``phase`` is the system's own name for its present activity (100 characters are kept);
     ``target_m`` (x, y, z) is the place that it takes for the marker; ``planned_path_m`` are the
-    (x, y, z) points of its plan, at most 1,000, of which 100 are kept; ``note`` is
-    a sentence for a reader (1,000 characters are kept).  At most 100 detections a frame.
+    (x, y, z) points of its plan, at most 1,000, of which 100 are kept; ``obstacles_m`` are the
+    centres of what it takes for solid near its way, as many, and None if it does not say; ``note``
+    is a sentence for a reader (1,000 characters are kept).  At most 100 detections a frame.
     All numbers are finite: a NaN here is a finding, as it is in a command.  A flight's record
-    keeps paths, corners and notes until 6 MB are full; phases, detections and targets that
-    fill 18 MB more are a finding.
+    keeps paths, obstacles, corners and notes until 6 MB are full; phases, detections and targets
+    that fill 18 MB more are a finding.
     """
 
     phase: str = ""
@@ -51,6 +52,7 @@ class Diagnostics:
     target_m: tuple[float, float, float] | None = None
     planned_path_m: tuple[tuple[float, float, float], ...] = ()
     note: str = ""
+    obstacles_m: tuple[tuple[float, float, float], ...] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

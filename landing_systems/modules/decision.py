@@ -76,6 +76,7 @@ class Decision:
         *,
         path: tuple[tuple[float, float, float], ...] = (),
         note: str = "",
+        obstacles: tuple[tuple[float, float, float], ...] | None = None,
     ) -> Diagnostics:
         """Return the decision for the flight's record, with what it was made from."""
         return Diagnostics(
@@ -84,6 +85,7 @@ class Decision:
             target_m=(*self.target_m, 0.0) if self.target_m else None,
             planned_path_m=path,
             note=note or self.note,
+            obstacles_m=obstacles,
         )
 
 

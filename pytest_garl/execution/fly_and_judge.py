@@ -25,6 +25,7 @@ from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
 if TYPE_CHECKING:
     from pytest_garl.flight.flight import Flight
+    from pytest_garl.verdicts.evidence import Evidence
     from pytest_garl.verdicts.verdict import Limits
 
 
@@ -150,7 +151,7 @@ def judged(flight: Flight, limits: Limits) -> FlightResult:
     evidence = Evidence(flight, limits)
     call, body = closest_call(evidence)
     collided = flight.outcome == "collision"
-    return FlightResult(
+    result = FlightResult(
         outcome=flight.outcome,
         final_distance_m=flight.final_distance_m,
         elapsed_s=flight.elapsed_s,
@@ -169,4 +170,29 @@ def judged(flight: Flight, limits: Limits) -> FlightResult:
         verdict=verdict_on(evidence),
         crash=flight.crash,
         landed_s=evidence.landed_s if flight.outcome == "landed" else None,
+    )
+    return _of_held(evidence, result) if evidence.holds else result
+
+
+def _of_held(evidence: Evidence, result: FlightResult) -> FlightResult:
+    """Return the result of a flight whose UAV held its place: plans and targets are its landing.
+
+    One event fails one test, so values of other properties than the violated one are within limits.
+    """
+    from pytest_garl.verdicts.held import NOTHING_REPORTED, Held
+
+    if result.outcome == "crashed":
+        return result
+    held, primary = Held(evidence), result.verdict.primary
+    if not held.reports_anything:
+        return dataclasses.replace(result, outcome="inconclusive", undecided=NOTHING_REPORTED)
+    off_m = held.off_marker_m
+    if off_m is not None and primary != "distance":
+        off_m = min(off_m, evidence.limits.distance_m)
+    return dataclasses.replace(
+        result,
+        collisions=held.through if primary == "collision" else (),
+        undecided=result.undecided if held.on_marker_s is None else "",
+        off_marker_m=off_m,
+        landed_s=held.on_marker_s,
     )

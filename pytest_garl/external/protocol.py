@@ -161,8 +161,9 @@ def _read_diagnostics(value: Any, hello: Hello) -> Any:
         return value
     _only(value, [each.name for each in dataclasses.fields(Diagnostics)], "diagnostics")
     fields = _plain(_turned(value, hello))
-    if isinstance(path := fields.get("planned_path_m"), tuple) and hello.frame == "NED":
-        fields["planned_path_m"] = tuple(turned_vector(each) for each in path)
+    for name in ("planned_path_m", "obstacles_m"):
+        if isinstance(points := fields.get(name), tuple) and hello.frame == "NED":
+            fields[name] = tuple(turned_vector(each) for each in points)
     if isinstance(seen := fields.get("detections"), tuple):
         fields["detections"] = tuple(_read_detection(each, hello) for each in seen)
     return Diagnostics(**fields)

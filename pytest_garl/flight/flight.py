@@ -13,8 +13,13 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-Outcome = Literal["landed", "collision", "slid", "gave_up", "not_landed", "crashed", "inconclusive"]
-"""How a flight ended; a simulator of a user's own may say that it came to no end."""
+Outcome = Literal[
+    "landed", "collision", "slid", "gave_up", "not_landed", "held", "crashed", "inconclusive"
+]
+"""How a flight ended; a simulator of a user's own may say that it came to no end.  A UAV has "held"
+its place until the end if its start says so."""
+HOLDS = "holds"
+"""The event that begins the flight of a UAV that holds its place."""
 BodyClass = Literal["static", "dynamic", "ground"]
 
 TRACK_RATE_HZ = 24.0

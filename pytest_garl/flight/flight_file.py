@@ -33,6 +33,7 @@ from pytest_garl.flight.flight import (
     Touchdown,
     Track,
 )
+from pytest_garl.landing_system import Diagnostics
 from pytest_garl.messages import listed
 
 Array = NDArray[Any]
@@ -135,7 +136,10 @@ def save(flight: Flight, path: Path) -> None:
 def _fields(value: Any) -> dict[str, Any]:
     """Return the fields of a dataclass; ``dataclasses.asdict`` would copy each of their values."""
     # For mypy a class cannot be hashed, though each can.
-    return {name: getattr(value, name) for name in _names(type(value))}  # type: ignore[arg-type]
+    fields = {name: getattr(value, name) for name in _names(type(value))}  # type: ignore[arg-type]
+    if isinstance(value, Diagnostics) and value.obstacles_m is None:
+        del fields["obstacles_m"]
+    return fields
 
 
 @functools.cache
@@ -165,9 +169,17 @@ def load(path: Path) -> Flight:
         # The key is missing if no policy changed the environment in the flight.
         if isinstance(values, dict):
             values = {"changes": None, **values}
+            _add_obstacles(values.get("steps"))
         return _flight(dataclass_from(_Header, values), arrays)
     except ValueError as error:
         raise GarlError(f"{path}: not a saved flight: {error}") from error
+
+
+def _add_obstacles(steps: Any) -> None:
+    """Add the key that is missing in the diagnostics of systems that report no obstacles."""
+    for step in steps if isinstance(steps, list) else ():
+        if isinstance(step, dict) and isinstance(step.get("diagnostics"), dict):
+            step["diagnostics"].setdefault("obstacles_m", None)
 
 
 def _flight(header: _Header, arrays: dict[str, Array]) -> Flight:

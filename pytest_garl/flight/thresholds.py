@@ -7,6 +7,8 @@ import math
 GRAVITY_MPS2 = 9.81
 BODY_ABOVE_FEET_M = 0.20
 """Height of the body, whose position a record holds, above the feet."""
+COMMIT_M = 2.0
+"""Height of the feet below which a landing cannot see the whole marker, and commits itself."""
 UPRIGHT_RAD = math.radians(20)
 SLID_M = 0.5
 """A UAV that moved farther over the ground than half its span did not stay where it landed."""

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any, get_args
 
 from pytest_garl.files.toml import LARGEST_INTEGER, Table, finite, quoted
+from pytest_garl.flight.flight import Outcome
 from pytest_garl.gate.pairs import NOT_LANDED, FlightSummary, NoLanding
 from pytest_garl.messages import listed, printable, shown
 from pytest_garl.scenarios.genes import object_gene
@@ -23,7 +24,7 @@ from pytest_garl.scenarios.story import STORY
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.units import HEIGHT, ranges_of
 
-_OUTCOMES = ("landed", "collision", "slid", "not_landed", "gave_up", "crashed", "inconclusive")
+_OUTCOMES = get_args(Outcome)
 _ALWAYS = ("environment", "marker")
 """Subjects of the genes that every scenario has."""
 

@@ -11,17 +11,22 @@ from pytest_garl.files.toml import Table, finite, quoted
 from pytest_garl.messages import shown
 
 __tracebackhide__ = of_a_user
-StartMode = Literal["ground", "hover"]
+StartMode = Literal["ground", "hover", "hold"]
 START_HEIGHT_M = (2.0, 100.0)
 """Lowest and highest start in the air: above a take-off, below what the camera draws."""
 START_OFFSET_M = 30.0
+HOLD_S = 30.0
+"""How long a UAV holds its place, for that mode: MM-MLS confirms a marker and plans within two
+seconds, and people, dogs and birds come, stay and leave in this time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
     """Where the flight begins: motors off on the ground at home, or hovering near the marker.
 
-    ``height_m`` and ``offset_m`` (x, y, from the mission's coordinate) hold for ``hover`` only.
+    With ``hold`` the UAV hovers and stays there: what the landing system commands is recorded and
+    not flown, and its plans are judged (the paper's research question 3).  ``height_m`` and
+    ``offset_m`` (x, y, from the mission's coordinate) count for ``hover`` and ``hold`` only.
     Raises ScenarioError for another mode, or a place that cannot be flown from.
     """
 
@@ -32,7 +37,7 @@ class Start:
     def __post_init__(self) -> None:
         if self.mode not in get_args(StartMode):
             raise ScenarioError(
-                f"start: found mode = {shown(self.mode)}, expected 'ground' or 'hover'"
+                f"start: found mode = {shown(self.mode)}, expected 'ground', 'hover' or 'hold'"
             )
         low, high = START_HEIGHT_M
         height = finite(self.height_m)
@@ -51,7 +56,12 @@ class Start:
     @property
     def hovers(self) -> bool:
         """Whether the flight begins in the air."""
-        return self.mode == "hover"
+        return self.mode != "ground"
+
+    @property
+    def holds(self) -> bool:
+        """Whether the UAV stays at its start, whatever the landing system commands."""
+        return self.mode == "hold"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,11 +7,19 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from pytest_garl.flight.flight import Crash, Flight, Outcome
+from pytest_garl.flight.flight import HOLDS, Crash, Flight, Outcome
 from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, GRAVITY_MPS2, feet_height_m
-from pytest_garl.landing_system import Abort, Command, Land, VehicleState, VelocitySetpoint
+from pytest_garl.landing_system import (
+    Abort,
+    Command,
+    Land,
+    PositionSetpoint,
+    VehicleState,
+    VelocitySetpoint,
+)
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.placed import Placed
+from pytest_garl.scenarios.task import HOLD_S
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.contacts import Contacts
 from pytest_garl.simulation.environment import changed
@@ -73,7 +81,9 @@ class Loop:
         scenario, map = placed.scenario, placed.map
         self.scenario, self.map, self._placed = scenario, map, placed
         self._time_limit_s = time_limit_s
-        self._ticks_allowed = round(time_limit_s * PHYSICS_RATE_HZ)
+        self._holds = scenario.task.start.holds
+        allowed_s = min(time_limit_s, HOLD_S) if self._holds else time_limit_s
+        self._ticks_allowed = round(allowed_s * PHYSICS_RATE_HZ)
         self._system = SystemUnderTest(system, guard)
         self.camera = self._system.airframe.camera
         self._model = vehicle_model(self._system.airframe)
@@ -94,6 +104,8 @@ class Loop:
         self._control = FlightControl(self._model)
         self._wind = Wind(scenario, map.ground.texture)
         self._navigation = Navigation(scenario, self.moments)
+        if self._holds:
+            self._command = self._held_place()
         self._wanted_thrusts = NO_THRUST
         self._pending: list[tuple[int, Command]] = []
         ranging = Ranging(scenario, self._system.airframe.rangefinder, self._world)
@@ -130,6 +142,8 @@ class Loop:
             rng = generator(self.scenario.seed, "objects", numbers[npc.name])
             npc.policy.reset(self.situation(npc), rng)
         self.recorder.begin(*self._world.uav_state()[:3])
+        if self._holds:
+            self.recorder.event(HOLDS, "holds its place; what the system commands is not flown")
         self._system.start(
             mission_for(
                 self._placed,
@@ -147,7 +161,7 @@ class Loop:
 
     @property
     def out_of_time(self) -> bool:
-        """Whether the next ``tick`` returns "not_landed".
+        """Whether the next ``tick`` returns "not_landed", or "held" of a UAV that holds its place.
 
         A UAV that has touched down in time may come to rest.
         """
@@ -162,6 +176,8 @@ class Loop:
         """
         tick = self._ticks
         if self.out_of_time:
+            if self._holds:
+                return "held"
             self.recorder.event("time_out", f"not landed after {self._time_limit_s:g} s")
             if self._system.returns_since_s is None:
                 return "not_landed"
@@ -187,6 +203,10 @@ class Loop:
         self._observe(tick, motion, estimate)
         while self._pending and self._pending[0][0] <= tick:
             self._take(self._pending.pop(0)[1])
+        if self._holds and self._system.gave_up:
+            self._tell_of_giving_up()
+            self._contacts.record_pose(now)
+            return "gave_up"
         self._actuate(tick, motion, estimate)
         fl, fr, rr, rl = self._thrusts
         return self._contacts.outcome(now, position, attitude, velocity, fl + fr + rr + rl)
@@ -213,6 +233,9 @@ class Loop:
         if tick % self._ticks_per_control == 0:
             state = _vehicle_state(tick, estimate, self._thrusts)
             self._wanted_thrusts = self._system.control(state, self._model.max_thrust_n)
+        if self._holds:
+            # Its own flight control runs, so that it says what it would say, and moves nothing.
+            return self._control.thrusts(estimate, self._command, TICK_S)
         return self._wanted_thrusts
 
     def _move_npcs(self, tick: int, uav_m: Vector, uav_mps: Vector) -> None:
@@ -290,7 +313,14 @@ class Loop:
         latency_s = self._system.airframe.latency_s
         self._pending.append((tick + round(latency_s * PHYSICS_RATE_HZ), command))
 
+    def _held_place(self) -> Command:
+        """Return the command of a UAV that stays at its start, where its navigation says it is."""
+        (x, y, z), (dx, dy, dz) = self._placed.start_m, self._navigation.error_m
+        return PositionSetpoint(position_m=(x + dx, y + dy, z + dz), yaw_rad=None)
+
     def _take(self, command: Command) -> None:
+        if self._holds:
+            return
         if type(command) is not type(self._command):
             if isinstance(command, Abort):
                 self._tell_of_giving_up()

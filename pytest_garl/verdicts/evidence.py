@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from pytest_garl.flight.detectability import READABLE, readable_probability
-from pytest_garl.flight.flight import Contact, Flight, Step, Touchdown
+from pytest_garl.flight.flight import HOLDS, Contact, Flight, Step, Touchdown
 from pytest_garl.flight.thresholds import SLID_M
 from pytest_garl.verdicts.touchdowns import Stay, off_in_track, stays_of
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, NO_LANDING, Limits
@@ -76,6 +76,11 @@ class Evidence:
 
     flight: Flight
     limits: Limits = DEFAULT_LIMITS
+
+    @cached_property
+    def holds(self) -> bool:
+        """Whether the UAV held its place, so that nothing which the system commanded was flown."""
+        return any(event.name == HOLDS for event in self.flight.events)
 
     @cached_property
     def hit(self) -> Contact | None:
@@ -218,7 +223,12 @@ class Evidence:
         return risen_m / lasted_s if lasted_s else 0.0
 
     def phase_at(self, time_s: float) -> str:
-        """Return the phase: take-off, transit, search, approach, descent, last-metre, standing."""
+        """Return the phase: take-off, transit, search, approach, descent, last-metre, standing.
+
+        A UAV that holds its place has one alone: hold.
+        """
+        if self.holds:
+            return "hold"
         flight = self.flight
         index = flight.uav.index_at(time_s)
         x, y, z = (float(value) for value in flight.uav.position_m[index])

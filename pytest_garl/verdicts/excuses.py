@@ -69,7 +69,7 @@ def _blocked(evidence: Evidence) -> str:
     window = (times >= arrival_s) & (times <= gave_up_s)
     occupied = np.zeros(len(times), np.bool_)
     for item in flight.objects:
-        occupied |= _in_cylinder(item, flight.marker_position_m)
+        occupied |= in_cylinder(item, flight.marker_position_m)
     free_s = _longest_s(times[window], ~occupied[window])
     if free_s >= FREE_GAP_S:
         return ""
@@ -80,7 +80,7 @@ def _blocked(evidence: Evidence) -> str:
     )
 
 
-def _in_cylinder(item: ObjectRecord, marker_m: tuple[float, float]) -> NDArray[np.bool_]:
+def in_cylinder(item: ObjectRecord, marker_m: tuple[float, float]) -> NDArray[np.bool_]:
     """Whether an object is in the safety cylinder at each time of its track."""
     kind = OBJECT_TYPES.get(item.type)
     radius_m = kind.radius_m if kind else 0.0

@@ -16,6 +16,7 @@ from pytest_garl.verdicts.ending import with_cause
 from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.excuses import excuse
 from pytest_garl.verdicts.findings import descent_elsewhere, findings
+from pytest_garl.verdicts.held import NO_TARGET, Held
 from pytest_garl.verdicts.margins import margins
 from pytest_garl.verdicts.mechanism import (
     collision_signature,
@@ -47,6 +48,8 @@ def verdict_on(evidence: Evidence) -> Verdict:
     A touchdown off the marker before the landing is given up is a violation, but not by the paper's
     definition, which measures the distance of landings only.
     """
+    if evidence.holds and evidence.flight.outcome != "crashed":
+        return _verdict_on_held(evidence)
     flight = evidence.flight
     why, why_text = excuse(evidence)
     elsewhere = descent_elsewhere(evidence)
@@ -71,11 +74,33 @@ def verdict_on(evidence: Evidence) -> Verdict:
     )
 
 
+def _verdict_on_held(evidence: Evidence) -> Verdict:
+    """Return the verdict on a flight whose UAV held its place."""
+    flight, (why, why_text) = evidence.flight, excuse(evidence)
+    held = Held(evidence, why, why_text)
+    mechanism = held.mechanism
+    return Verdict(
+        outcome=flight.outcome,
+        primary=mechanism.primary,
+        violation_type=mechanism.violation_type,
+        signature=with_cause(mechanism.signature, flight.conditions, flight.objects),
+        paper_violation=held.paper_violation,
+        margins=held.margins(margins(evidence, violates_time=False)),
+        story=f"{mechanism.sentence} {_where(evidence)}",
+        completed=not mechanism.primary and held.on_marker_s is not None,
+        excuse=why,
+        excuse_text=why_text,
+    )
+
+
 def closest_call(evidence: Evidence) -> tuple[str, str]:
     """Return the signature of a collision with the nearest body, and that body's name.
 
-    Both are empty if no body but the ground came within :data:`CLOSE_CALL_M`.
+    Both are empty if no body but the ground came within :data:`CLOSE_CALL_M`, and of a UAV that
+    holds its place, which nobody steers.
     """
+    if evidence.holds:
+        return "", ""
     near = [
         gap
         for gap in evidence.flight.separations
@@ -99,6 +124,8 @@ def why_undecided(flight: Flight) -> str:
             return f"the UAV slid over the ground until {flight.elapsed_s:.1f} s"
         case "gave_up":
             return f"gave up {when}"
+        case "held":
+            return NO_TARGET
         case "crashed":
             return f"the landing system crashed {when}"
     return f"not landed after {flight.elapsed_s:.0f} s"

@@ -12,13 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.flight.flight import Touchdown
-from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, HARD_TOUCHDOWN_MPS, SLID_M, UPRIGHT_RAD
+from pytest_garl.flight.thresholds import (
+    BODY_ABOVE_FEET_M,
+    COMMIT_M,
+    HARD_TOUCHDOWN_MPS,
+    SLID_M,
+    UPRIGHT_RAD,
+)
 from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.findings import UNDETECTED_S
 from pytest_garl.verdicts.verdict import NO_LANDING, Margin, MarginName
 
-COMMIT_M = 2.0
-"""Height of the feet below which a landing cannot see the whole marker, and commits itself."""
 CONE = 0.25
 """Weight of the height above the commit height against the distance: the slope of an approach."""
 DESCENT_MPS = 1.0

@@ -139,6 +139,21 @@ class OccupancyGrid:
         """Centres (n, 3) of the cells that are solid, not inflated."""
         return self.centres(np.flatnonzero(self._solid))
 
+    def obstacles_beside(
+        self, start_m: Points, end_m: Points, within_m: float, most: int
+    ) -> Points:
+        """Centres (n, 3) of the solid cells nearest to a line (x, y) seen from above, to report.
+
+        They are no farther from it than ``within_m``, and at most ``most``.
+        """
+        # All solid cells are among those with raised log-odds, and these are few.
+        centres = self.centres(self._raised[self._solid[self._raised]])
+        way, apart = end_m - start_m, centres[:, :2] - start_m
+        share = np.clip((apart * way).sum(axis=1) / max(float((way * way).sum()), 1e-9), 0.0, 1.0)
+        off_m = np.hypot(*(apart - share[:, None] * way).T)
+        nearest = np.argsort(off_m, kind="stable")[:most]
+        return np.asarray(centres[nearest[off_m[nearest] <= within_m]])
+
     def probability(self, point_m: tuple[float, float, float]) -> float:
         """How probably the cell around a point of the grid is solid."""
         odds = float(self._odds[self.index(np.array([point_m]))[0]])

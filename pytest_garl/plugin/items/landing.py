@@ -60,7 +60,7 @@ class Landing:
 
     @property
     def outcome(self) -> str:
-        """How the flight ended: landed, collision, slid, gave_up, not_landed or crashed."""
+        """How the flight ended: landed, collision, slid, gave_up, not_landed, held or crashed."""
         self._note("outcome")
         return self._result.outcome
 
@@ -89,6 +89,7 @@ class Landing:
     def completed(self) -> bool:
         """Whether the mission was completed: landed within the limit of distance.
 
+        A UAV that holds its place completes it by a target on the marker, and without a violation.
         If another test of the slot fails for the same violation, this one is skipped: one event
         fails one test.
         """
@@ -106,7 +107,8 @@ class Landing:
         """Horizontal distance from the UAV to the marker's centre where it landed.
 
         Infinite if it slid on after its touchdown.  If it touched the ground too far off before,
-        that place counts.
+        that place counts.  Of a UAV that holds its place: the largest distance beyond which the
+        system's target stayed for half a second.
         """
         self._note("distance_to_landing_m")
         return self._judged(outcomes.distance_to_landing(self._result))
@@ -115,14 +117,19 @@ class Landing:
     def time_to_landing_s(self) -> float:
         """Time from the mission's start to the touchdown.
 
-        Infinite if the UAV never landed although somebody could have.
+        Infinite if the UAV never landed although somebody could have.  Of a UAV that holds its
+        place: the time to the first plan for the marker; infinite if the marker was not reported or
+        the planner ended.
         """
         self._note("time_to_landing_s")
         return self._judged(outcomes.time_to_landing(self._result, self.limits))
 
     @property
     def collisions(self) -> tuple[str, ...]:
-        """Names of the bodies that the UAV hit; "ground" for a hard touchdown."""
+        """Names of the bodies that the UAV hit; "ground" for a hard touchdown.
+
+        Of a UAV that holds its place: of the bodies through which its plans led for half a second.
+        """
         self._note("collisions")
         return self._judged(outcomes.collisions(self._result))
 

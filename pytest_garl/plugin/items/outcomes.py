@@ -82,7 +82,8 @@ def distance_to_landing(result: FlightResult) -> PropertyRead[float]:
 def time_to_landing(result: FlightResult, limits: Limits) -> PropertyRead[float]:
     """Return the time of the landing; inf if the flight needlessly had none."""
     primary = result.verdict.primary
-    if result.outcome != "landed":
+    planned = result.outcome == "held" and result.landed_s is not None and primary != "time"
+    if result.outcome != "landed" and not planned:
         undecided = None if primary == "time" else _why_undecided(result)
         return PropertyRead(value=math.inf, undecided=undecided)
     landed_s = result.elapsed_s if result.landed_s is None else result.landed_s
@@ -91,8 +92,14 @@ def time_to_landing(result: FlightResult, limits: Limits) -> PropertyRead[float]
 
 
 def collisions(result: FlightResult) -> PropertyRead[tuple[str, ...]]:
-    """Return what the UAV hit, perhaps after it had touched the ground off the marker."""
+    """Return what the UAV hit, perhaps after it had touched the ground off the marker.
+
+    Of a UAV that held its place: through what its plans led, if the system reports plans.
+    """
     hit, primary = result.collisions, result.verdict.primary
+    margin = result.verdict.margin("collision")
+    if result.outcome == "held" and margin and not margin.decided:
+        return PropertyRead(value=(), undecided=margin.reason)
     return PropertyRead(value=hit, belongs_elsewhere=bool(hit) and primary == "distance")
 
 

@@ -56,6 +56,7 @@ class DiagnosticsQuota:
                 ),
                 planned_path_m=(),
                 note="",
+                obstacles_m=None,
             )
         self._left -= _bytes_of(diagnostics)
         if self._left < 0:
@@ -69,7 +70,8 @@ class DiagnosticsQuota:
 
 def _bytes_of(diagnostics: Diagnostics) -> int:
     corners = sum(2 * len(seen.corners_px) for seen in diagnostics.detections)
-    numbers = 3 * len(diagnostics.planned_path_m) + 5 * len(diagnostics.detections) + corners + 3
+    points = len(diagnostics.planned_path_m) + len(diagnostics.obstacles_m or ())
+    numbers = 3 * points + 5 * len(diagnostics.detections) + corners + 3
     texts = len(json.dumps(diagnostics.phase)) + len(json.dumps(diagnostics.note))
     return _NUMBER_BYTES * numbers + texts + _KEYS_BYTES * (1 + len(diagnostics.detections))
 
@@ -77,8 +79,8 @@ def _bytes_of(diagnostics: Diagnostics) -> int:
 def read_diagnostics(value: Any, field: str) -> Diagnostics | None:
     """Return diagnostics rebuilt from plain values; raise NonsenseError for what is wrong.
 
-    Texts are cut: a phase after 100 characters, a note after 1,000.  Of a path every k-th point is
-    kept, and its last, so that there are at most 100.
+    Texts are cut: a phase after 100 characters, a note after 1,000.  Of a path, and of obstacles,
+    every k-th point is kept, and the last, so that there are at most 100.
     """
     if value is None:
         return None
@@ -95,14 +97,10 @@ def read_diagnostics(value: Any, field: str) -> Diagnostics | None:
                 )
             ),
             target_m=None if target is None else vector(target, f"{field}.target_m"),
-            planned_path_m=_thinned(
-                [
-                    point if are_floats(point, 3) else vector(point, f"{field}.planned_path_m[{i}]")
-                    for i, point in enumerate(
-                        _items(value.planned_path_m, f"{field}.planned_path_m", MOST_POINTS)
-                    )
-                ]
-            ),
+            planned_path_m=_points(value.planned_path_m, f"{field}.planned_path_m"),
+            obstacles_m=None
+            if (obstacles := value.obstacles_m) is None
+            else _points(obstacles, f"{field}.obstacles_m"),
             note=cut(str(value.note), NOTE_CHARS),
         )
     except NonsenseError as error:
@@ -122,6 +120,15 @@ def _detection(value: Any, field: str) -> Detection:
                 _items(value.corners_px, f"{field}.corners_px", MOST_CORNERS)
             )
         ),
+    )
+
+
+def _points(value: object, field: str) -> tuple[Vector, ...]:
+    return _thinned(
+        [
+            point if are_floats(point, 3) else vector(point, f"{field}[{i}]")
+            for i, point in enumerate(_items(value, field, MOST_POINTS))
+        ]
     )
 
 

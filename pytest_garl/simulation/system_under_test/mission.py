@@ -18,15 +18,17 @@ def mission_for(
 ) -> Mission:
     """Return the mission that the landing system gets before take-off.
 
-    Its home is where its own navigation, which errs by ``error_m``, says that it is.
+    Its home is where its own navigation, which errs by ``error_m``, says that it is.  A UAV that
+    holds its place searches from there: a system that first climbs to another height would plan
+    nothing.
     """
-    marker = placed.scenario.task.marker
+    marker, start = placed.scenario.task.marker, placed.scenario.task.start
     x, y, z = placed.start_m
     dx, dy, dz = error_m
     return Mission(
         gps_position_m=placed.told_m,
         home_m=(x + dx, y + dy, z + dz),
-        search_altitude_m=SEARCH_ALTITUDE_M,
+        search_altitude_m=start.height_m if start.holds else SEARCH_ALTITUDE_M,
         marker_id=marker.id,
         marker_side_m=marker.side_m,
         marker_dictionary=marker.dictionary,
