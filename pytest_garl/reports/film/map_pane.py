@@ -27,6 +27,8 @@ from pytest_garl.simulation.randomness import generator
 WIDTH, HEIGHT = 384, 656
 MARGIN_M = 2.0
 """Width of the strip around the map's bounds that the pane also shows."""
+OBSTACLE_PX = 4.0
+"""Side of a square that stands for an obstacle which the landing system reports."""
 _UAV_RADIUS_M = 0.5
 _WHITE_SHARE = 0.62
 """Share of white that is mixed into the painted ground, so that paths stand out."""
@@ -137,6 +139,12 @@ class MapPane:
         diagnostics = step.diagnostics if step else None
         if diagnostics is None:
             return
+        for place in diagnostics.obstacles_m or ():
+            x, y = self._pixel(place)
+            half = OBSTACLE_PX / 2
+            square = np.array([(x - half, y - half), (x + half, y - half)])
+            corners = np.concatenate([square, square[::-1] + (0.0, OBSTACLE_PX)])
+            drawing.area(pane, corners, drawing.SYSTEM)
         if diagnostics.planned_path_m:
             drawing.line(pane, self.pixels(np.array(diagnostics.planned_path_m)), drawing.SYSTEM, 3)
         if diagnostics.target_m is not None:
