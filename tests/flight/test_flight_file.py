@@ -161,6 +161,19 @@ def test_a_file_in_which_nothing_changed_the_environment_is_read(file: Path) -> 
     assert flight_file.load(file).objects[0].changes == ()
 
 
+def test_obstacles_are_in_the_record_of_a_system_that_reports_them(file: Path) -> None:
+    """The record of any other system is the same as without the field."""
+    with np.load(file) as saved:
+        assert b"obstacles_m" not in saved["header"].tobytes()
+    first = flight().steps[0]
+    assert first.diagnostics
+    for obstacles in ((), ((1.0, 2.0, 0.5),)):
+        said = dataclasses.replace(first.diagnostics, obstacles_m=obstacles)
+        steps = (dataclasses.replace(first, diagnostics=said),)
+        flight_file.save(dataclasses.replace(flight(), steps=steps), file)
+        assert flight_file.load(file).steps == steps
+
+
 def _set(key: str, value: Any) -> Callable[[Any, Header], None]:
     return lambda _, header: header.update({key: value})
 

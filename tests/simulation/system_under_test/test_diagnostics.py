@@ -39,6 +39,13 @@ def test_a_long_path_keeps_its_ends_and_points_between_them() -> None:
         assert kept == path or len(kept) >= 50
 
 
+def test_a_system_may_say_that_there_are_no_obstacles() -> None:
+    for obstacles, kept in ((None, None), ((), ()), (((1, 2, 3),), ((1.0, 2.0, 3.0),))):
+        command = read_command(land_with(obstacles_m=obstacles), DiagnosticsQuota())
+        assert command.diagnostics
+        assert command.diagnostics.obstacles_m == kept
+
+
 def rich_landing(detections: int, characters: int = 1_000) -> Land:
     corners = ((0.1234567890123, -1e-17),) * 32
     seen = Detection(

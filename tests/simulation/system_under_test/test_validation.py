@@ -103,6 +103,7 @@ WRONG: list[tuple[Callable[[], Any], str, str]] = [
         "BadDiagnostics",
         "1000",
     ),
+    (lambda: land_with(obstacles_m=((0.0, NAN, 0.0),)), "BadDiagnostics", "obstacles_m[0]"),
     (lambda: land_with(detections=5), "BadDiagnostics", "detections = 5"),
     (lambda: land_with(detections=(5,)), "BadDiagnostics", "detections[0] = 5"),
     (
