@@ -46,8 +46,8 @@ class FlightSummary:
 
     @property
     def landed(self) -> bool:
-        """Whether the flight landed within the limits, and violated no other property."""
-        return self.outcome == "landed" and not self.violated
+        """Whether the flight landed, or held its place, and violated no property."""
+        return self.outcome in ("landed", "held") and not self.violated
 
     @property
     def not_landed(self) -> bool:

@@ -41,6 +41,18 @@ _ENDINGS_OF_TYPE = {
     "slid": "slides after the touchdown",
     "abort": "gives up",
 }
+_ENDINGS_WHILE_HELD = {
+    "I": "takes something else for the marker",
+    "off": "aims beside the marker",
+    "II": "does not report the marker",
+    "IV": "plans through it",
+    "V:no-plan": "has no plan any more",
+    "V:gave-up": "gives up",
+    "late": "plans late",
+}
+"""What happens while the UAV holds its place, by type, or by type and cause."""
+_HELD = {"hold", "plan"}
+"""The phases in signatures of such flights."""
 _PHASES = {
     "take-off": "during the take-off",
     "transit": "on the way to the marker",
@@ -107,6 +119,9 @@ def _ending(signature: str) -> str:
     """Return what happens, in words; empty for signatures without words of their own."""
     kind, _, rest = signature.partition(":")
     parts = rest.split(":")
+    if _HELD & {*parts[1:]} or (kind == "off" and parts[0] in _HELD):
+        by_type = _ENDINGS_WHILE_HELD.get(kind, "")
+        return _ENDINGS_WHILE_HELD.get(f"{kind}:{parts[0]}", by_type)
     if kind == "I":
         if parts[0] == "nothing":
             return "comes down on open ground, off the marker"

@@ -57,7 +57,7 @@ marker for long enough; something never left it free for long enough."""
 NEVER_GAVE_UP = "late:never-gave-up"
 _BLOCKED = "The marker was blocked"
 """In the story of a flight in which something never left the marker free for long enough."""
-_CRASHES = {"raised": "Python error", "nonsense": "wrong answer"}
+_CRASHES = {"raised": "Python error", "nonsense": "wrong answer", "ended": "planner ended"}
 """What texts call a crash, if not by its kind."""
 LANDED, IDLE, INCONCLUSIVE = "landed", "idle", "inconclusive"
 """Ends of flights that violate nothing; idle is one in which nobody could have landed."""
@@ -301,6 +301,11 @@ class SearchRecord:
         return self.outcomes["landed"]
 
     @property
+    def held(self) -> int:
+        """How many flights held their place to the end."""
+        return self.outcomes["held"]
+
+    @property
     def completed(self) -> int:
         """How many flights landed within the limit of distance."""
         return sum(verdict.completed for verdict in self.verdicts)
@@ -326,7 +331,7 @@ class SearchRecord:
         counts: Counter[str] = Counter()
         for each in self.flights:
             if each.result.verdict.violation_type == "V":
-                kind = each.result.crash.kind if each.result.crash else "raised"
+                kind = each.result.crash.kind if each.result.crash else "ended"
                 counts[_CRASHES.get(kind, kind)] += 1
         return counts
 
@@ -580,7 +585,7 @@ def _end(flight: LedgerFlight, own: Set[str]) -> str:
         return flight.result.verdict.violation_type
     if flight.id.slot_id in own:
         return "own"
-    return LANDED if flight.result.outcome == "landed" else IDLE
+    return LANDED if flight.result.outcome in ("landed", "held") else IDLE
 
 
 def by_cause(shown: Iterable[T], kind_of: Callable[[T], KindRecord]) -> list[T]:

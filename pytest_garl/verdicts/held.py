@@ -6,7 +6,7 @@ diagnostics and compared with ground truth:
 
 - I and off: for half a second its target is beyond the limit of distance from the marker.
 - II: it does not report a marker that can be read for three seconds.
-- IV: for half a second its plans lead through a body that it could know (``plans.py``).
+- IV: for half a second its plans lead through a body that it could know (``held_plans.py``).
 - V: it raises, gives up though it could land, or had a plan and has none for two seconds, while
   nobody is near the marker.
 
@@ -28,13 +28,18 @@ from numpy.typing import NDArray
 from pytest_garl.verdicts.evidence import AT_MARKER_M, Evidence, Place, Report
 from pytest_garl.verdicts.excuses import in_cylinder
 from pytest_garl.verdicts.findings import UNDETECTED_S
+from pytest_garl.verdicts.held_plans import LASTS_S, Plans, first_span, windows_of
 from pytest_garl.verdicts.mechanism import Mechanism
-from pytest_garl.verdicts.plans import LASTS_S, Plans, first_span, windows_of
 from pytest_garl.verdicts.verdict import Excuse, Margin, MarginName
 
 NO_PLAN_S = 2.0
 """A planner that had a plan has ended after this time without one: MM-MLS waits for one second
 after the last thing has moved below it, and plans ten times a second."""
+AWAY_M = AT_MARKER_M
+"""A plan that ends nearer to the UAV leads nowhere: whoever has nothing to fly plans no more."""
+SETTLED_S = 2.0
+"""After a jump of its position a system finds the marker again in less than this time; until then
+its memory of the target is where that was."""
 NO_TARGET = "the UAV held its place, and the marker was never the system's target"
 NO_PLAN = "the UAV held its place, and the system reported no planned path"
 NOTHING_REPORTED = (
@@ -92,10 +97,22 @@ class Held:
 
     @cached_property
     def _off_m(self) -> NDArray[np.float64]:
-        """The distance of the target from the marker in each frame; NaN without a target."""
-        marker = self.evidence.flight.marker_position_m
+        """The distance of the target from the marker in each frame.
+
+        NaN without a target, and shortly after the error of the system's position has changed by
+        more than the limit.
+        """
         targets = (each.target_m for each in self._reports)
-        return np.array([math.dist(each, marker) if each else math.nan for each in targets])
+        off_m = [math.dist(each, self._marker_m) if each else math.nan for each in targets]
+        errors = np.array([each.step.estimation_error_m[:2] for each in self._reports])
+        times = self.plans.times_s
+        before = np.searchsorted(times, times - SETTLED_S)
+        changed_m = [
+            float(np.ptp(errors[start : end + 1], axis=0).max())
+            for end, start in enumerate(before.tolist())
+        ]
+        settled = np.array(changed_m) <= self.evidence.limits.distance_m
+        return np.where(settled, np.array(off_m), math.nan)
 
     @cached_property
     def on_marker_s(self) -> float | None:
@@ -254,9 +271,12 @@ class Held:
         )
 
     def _gap(self, *, clear: bool) -> tuple[float, float] | None:
-        """Return the first time without a plan after one; ``clear``: with nobody at the marker."""
+        """Return the first time without a plan after one that led away.
+
+        ``clear`` asks for one in which nobody was near the marker.
+        """
         plans = self.plans
-        missing = ~plans.planned & np.logical_or.accumulate(plans.planned)
+        missing = ~plans.planned & (plans.last_reach_m > AWAY_M)
         if clear:
             missing &= ~self._occupied
         return first_span(plans.times_s, missing, NO_PLAN_S)

@@ -1,4 +1,4 @@
-"""The situations of the paper's research question 3: MM-MLS perceives and plans, and is not flown."""
+"""The situations of the paper's research question 3: MM-MLS plans, and nothing is flown."""
 
 from __future__ import annotations
 
@@ -72,9 +72,7 @@ def test_mm_plans_through_a_dog_that_its_depth_camera_does_not_reach(flown: Flow
     (through,) = Held(Evidence(flight, LIMITS)).plans.through
     # The camera shows the dog, the depth image does not.
     assert through.in_view_s > 0.5
-    assert not any(
-        step.diagnostics.obstacles_m for step in flight.steps if step.diagnostics
-    )
+    assert not any(step.diagnostics.obstacles_m for step in flight.steps if step.diagnostics)
 
 
 def test_mm_waits_for_the_same_dog_if_its_depth_camera_reaches_the_ground(flown: Flown) -> None:
@@ -86,7 +84,9 @@ def test_mm_waits_for_the_same_dog_if_its_depth_camera_reaches_the_ground(flown:
     assert held.plans.separation_m > 0.5
     reported = [s.diagnostics.obstacles_m for s in flight.steps if s.diagnostics]
     assert any(
-        math.dist(place[:2], flight.marker_position_m) < 0.6 for each in reported for place in each or ()
+        math.dist(place[:2], flight.marker_position_m) < 0.6
+        for each in reported
+        for place in each or ()
     )
 
 

@@ -44,6 +44,17 @@ def shrunk(signature: str, severity: Severity, **fields: Any) -> Case:
             "fog of 10 m: the marker is never readable",
         ),
         (
+            "IV:dog:plan:unseen",
+            conditions(depth="range 4 m"),
+            "depth (range 4 m): plans through it",
+        ),
+        (
+            "V:no-plan:hold",
+            conditions(depth="range 4 m"),
+            "depth (range 4 m): has no plan any more",
+        ),
+        ("off:hold", conditions(fog="visibility 10 m"), "fog of 10 m: aims beside the marker"),
+        (
             "II:gave-up-in-sight:approach",
             conditions(light="sun 23 degrees high"),
             "sun 23 degrees high: gives up with the marker in view on the approach",

@@ -15,8 +15,8 @@ from pytest_garl.landing_system import Diagnostics
 from pytest_garl.scenarios.bodies import Part, quaternion_of
 from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.held import Held
+from pytest_garl.verdicts.held_plans import part_offsets
 from pytest_garl.verdicts.judge import judge
-from pytest_garl.verdicts.plans import part_offsets
 from pytest_garl.verdicts.verdict import Limits, Verdict
 from tests.verdicts.flights import CLEAR, CRASH, FOGGY, detection, flight, nominal
 
@@ -229,12 +229,41 @@ def test_a_planner_may_wait_while_somebody_is_on_the_marker() -> None:
     assert found.story.startswith("Held its place. From 4.0 s to 8.0 s it had no plan while")
 
 
+def test_a_planner_that_had_nowhere_to_go_has_not_ended() -> None:
+    """It hovers at its goal."""
+    here = dataclasses.replace(ON_MARKER, planned_path_m=((0.0, 0.0, 5.0), (1.0, 0.0, 5.0)))
+    assert not verdict_of(lambda t: here if t < 4.0 else NO_PLAN).violation
+
+
+def test_a_jump_of_its_position_moves_the_target_for_a_moment() -> None:
+    flown = held(always)
+    jumped = tuple(
+        dataclasses.replace(
+            each,
+            estimation_error_m=(2.0 if each.time_s >= 4.0 else 0.0, 0.0, 0.0),
+        )
+        for each in flown.steps
+    )
+    never = dataclasses.replace(flown, steps=jumped)
+    assert judge(never, LIMITS).signature == "I:nothing:hold"
+    again = tuple(
+        dataclasses.replace(
+            each, diagnostics=dataclasses.replace(ON_MARKER, target_m=(2.0, 0.0, 0.0))
+        )
+        if each.time_s >= 5.0
+        else each
+        for each in jumped
+    )
+    assert judge(dataclasses.replace(flown, steps=again), LIMITS).primary != "distance"
+
+
 def test_a_system_that_never_plans_has_not_ended() -> None:
     assert not verdict_of(lambda _: NO_PLAN).violation
 
 
 @pytest.mark.parametrize(
-    ("rule", "signature"), [("needless", "V:gave-up:hold"), ("ok", ""), ("violation", "V:gave-up:hold")]
+    ("rule", "signature"),
+    [("needless", "V:gave-up:hold"), ("ok", ""), ("violation", "V:gave-up:hold")],
 )
 def test_giving_up_ends_the_plan(rule: Any, signature: str) -> None:
     events = (

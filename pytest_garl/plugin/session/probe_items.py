@@ -261,7 +261,7 @@ def _searched(
 
 def _has_landed(flight: CompletedFlight) -> bool:
     verdict = flight.result.verdict
-    return flight.result.outcome == "landed" and not verdict.violation
+    return verdict.completed and not verdict.violation
 
 
 def excusing_case(corpus: Corpus, system: str, ending: str, probe: Scenario, twin: Scenario) -> str:

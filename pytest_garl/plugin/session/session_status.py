@@ -127,7 +127,7 @@ def notes(tally: Tally) -> Iterator[str]:
         yield f"nothing was flown: {_why_nothing_flew(tally)}"
     yield from _hidden(tally)
     for search in tally.record.searches if tally.record else ():
-        if not search.landed:
+        if not search.landed and not search.held:
             yield f"{search.name}: landed in none of {counted(search.flown, 'flight')}"
     for name, slots in _unrepeated_by_search(tally).items():
         violations = counted(len(slots), "violation")

@@ -278,6 +278,9 @@ def _no_landing(search: SearchRecord) -> str:
 def _landings(search: SearchRecord) -> str:
     """Return the median and the worst figures of the flights that landed, or that none did."""
     distance_m, time_s = search.landing_distance_m, search.landing_time_s
+    if search.held:
+        held = counted(search.held, "flight")
+        return f"held its place in {held}: no landing, its plans are judged"
     if distance_m is None or time_s is None:
         return "landed 0 %: no flight landed, so nothing is known of its landings"
     return (

@@ -24,6 +24,8 @@ OBJECTS: Mapping[str, Colour] = MappingProxyType(
     {"person": (158, 26, 44), "dog": (112, 66, 18), "bird": (0, 112, 122)}
 )
 """Colours of the dynamic objects by type; other types are drawn in ``INK``."""
+OBSTACLE_PX = 4.0
+"""Side of the square that stands for an obstacle which the landing system reports."""
 _SHIFT = 4
 """Fractional bits of the coordinates that OpenCV draws at."""
 
@@ -49,6 +51,13 @@ def line(
 def area(image: Image, points: NDArray[Any], colour: Colour) -> None:
     """Fill a convex polygon with corners (n, 2) in pixels."""
     cv2.fillConvexPoly(image, _fixed(points), colour, cv2.LINE_AA, _SHIFT)
+
+
+def square(image: Image, at: Point, side: float, colour: Colour) -> None:
+    """Draw a filled square about ``at``."""
+    (x, y), half = at, side / 2
+    left, right, high, low = x - half, x + half, y - half, y + half
+    area(image, np.array([(left, high), (right, high), (right, low), (left, low)]), colour)
 
 
 def disc(image: Image, at: Point, radius: float, colour: Colour, thickness: int = -1) -> None:

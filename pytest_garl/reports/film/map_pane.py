@@ -9,11 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.flight.flight import Flight, ObjectRecord, Step
+from pytest_garl.flight.flight import HOLDS, Flight, ObjectRecord, Step
 from pytest_garl.landing_system import Camera
 from pytest_garl.reports.film import drawing
 from pytest_garl.reports.film.labels import Labels
 from pytest_garl.reports.film.pose import Poses, path_until
+from pytest_garl.reports.film.side_view import SideView
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placed import Placed
@@ -27,8 +28,6 @@ from pytest_garl.simulation.randomness import generator
 WIDTH, HEIGHT = 384, 656
 MARGIN_M = 2.0
 """Width of the strip around the map's bounds that the pane also shows."""
-OBSTACLE_PX = 4.0
-"""Side of a square that stands for an obstacle which the landing system reports."""
 _UAV_RADIUS_M = 0.5
 _WHITE_SHARE = 0.62
 """Share of white that is mixed into the painted ground, so that paths stand out."""
@@ -47,6 +46,8 @@ class MapPane:
         self._marker = placed.pad.main
         self._background = self._ground(placed)
         self._draw_background()
+        holds = any(event.name == HOLDS for event in flight.events)
+        self._side_view = SideView(flight, placed) if holds else None
 
     def pixels(self, places_m: NDArray[Any]) -> NDArray[np.float64]:
         """Turn world places (n, 2 or 3) into the pane's pixels (n, 2)."""
@@ -74,6 +75,8 @@ class MapPane:
         nose = rotate(poses.attitude, (1.0, 0.0, 0.0))
         yaw = math.atan2(nose[1], nose[0])
         self._draw_disc_with_heading(pane, poses.position_m, yaw, _UAV_RADIUS_M, drawing.UAV)
+        if self._side_view:
+            self._side_view.draw(pane, poses, step)
         if ended:
             for contact in self._flight.contacts[-1:]:
                 drawing.cross(pane, self._pixel(contact.position_m), 9, drawing.HIT)
@@ -140,11 +143,7 @@ class MapPane:
         if diagnostics is None:
             return
         for place in diagnostics.obstacles_m or ():
-            x, y = self._pixel(place)
-            half = OBSTACLE_PX / 2
-            square = np.array([(x - half, y - half), (x + half, y - half)])
-            corners = np.concatenate([square, square[::-1] + (0.0, OBSTACLE_PX)])
-            drawing.area(pane, corners, drawing.SYSTEM)
+            drawing.square(pane, self._pixel(place), drawing.OBSTACLE_PX, drawing.SYSTEM)
         if diagnostics.planned_path_m:
             drawing.line(pane, self.pixels(np.array(diagnostics.planned_path_m)), drawing.SYSTEM, 3)
         if diagnostics.target_m is not None:

@@ -10,9 +10,8 @@ import numpy as np
 
 from pytest_garl.flight.detectability import readable_probability
 from pytest_garl.flight.flight import Flight, Step
-from pytest_garl.flight.thresholds import feet_height_m
+from pytest_garl.flight.thresholds import COMMIT_M, feet_height_m
 from pytest_garl.verdicts.evidence import LOW_M, Evidence
-from pytest_garl.flight.thresholds import COMMIT_M
 from pytest_garl.verdicts.verdict import NO_LANDING
 
 MOST = 8

@@ -1,11 +1,12 @@
 """The plans of a UAV that holds its place, against the bodies that were there.
 
 A plan is the path that the landing system reports with a frame, in the world; from an end below the
-commit height a landing goes on straight down, and so does the plan.  It leads through a body if the UAV on it would touch the body where that stands at this moment.  That counts once it
-lasts: half a second long, of a body that the camera has shown for a third of a second before, in
-each frame.  So who crosses the path in a moment, or has just come into view, counts as little as
-noise.  A plan that leads round a walker's place of later, and through that of today, counts: where
-somebody will be in some seconds, nobody knows.
+commit height a landing goes on straight down, and so does the plan.  It leads through a body if the
+UAV on it would touch the body where that stands at this moment.  That counts once it lasts: half a
+second long, of a body that the camera has shown for a third of a second before, in each frame.  So
+who crosses the path in a moment, or has just come into view, counts as little as noise.  Where
+somebody will be in some seconds, nobody knows: a plan through the place that a walker is about to
+leave counts as well.
 
 Bodies are persons, dogs and birds.  A flight's record has no trees and walls.
 """
@@ -74,6 +75,17 @@ class Plans:
         """Whether the system reports a plan with each frame (n,)."""
         paths = (step.diagnostics and step.diagnostics.planned_path_m for step in self.steps)
         return np.array([bool(path) for path in paths], np.bool_)
+
+    @cached_property
+    def last_reach_m(self) -> Array:
+        """How far from the UAV the last plan ended up to each frame (n,); 0 before the first."""
+        uav, reaches, reach_m = self.flight.uav, [], 0.0
+        for step in self.steps:
+            if step.diagnostics and step.diagnostics.planned_path_m:
+                end = np.array(step.diagnostics.planned_path_m[-1]) - step.estimation_error_m
+                reach_m = float(np.linalg.norm(end - uav.position_m[uav.index_at(step.time_s)]))
+            reaches.append(reach_m)
+        return np.array(reaches)
 
     @cached_property
     def separation_m(self) -> float:
@@ -267,9 +279,7 @@ def windows_of(times_s: Array, values: Array, lasts_s: float) -> Sequence[Array]
     """Return the values in each shortest run of frames that lasts for some time."""
     ends = np.searchsorted(times_s, times_s + lasts_s - _ROUNDING_S)
     return [
-        values[begin : end + 1]
-        for begin, end in enumerate(ends.tolist())
-        if end < len(times_s)
+        values[begin : end + 1] for begin, end in enumerate(ends.tolist()) if end < len(times_s)
     ]
 
 
