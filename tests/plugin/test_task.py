@@ -85,8 +85,11 @@ def test_limits_that_state_no_distance_follow_the_size_of_the_marker(
         ("marker={'size_m': 1.0}", "*marker= has size_m; expected dictionary, id, side_m, nested*"),
         ("marker={'id': 77}", "*marker: found id = 77, expected a whole number from 0 to 49*"),
         ("start=7", "*start=7: expected pytest_garl.Start(...)*"),
-        ("start='air'", "*start: found mode = 'air', expected 'ground' or 'hover'*"),
-        ("start={'mode': 'air'}", "*start: found mode = 'air', expected 'ground' or 'hover'*"),
+        ("start='air'", "*start: found mode = 'air', expected 'ground', 'hover' or 'hold'*"),
+        (
+            "start={'mode': 'air'}",
+            "*start: found mode = 'air', expected 'ground', 'hover' or 'hold'*",
+        ),
     ],
 )
 def test_an_invalid_marker_or_start_is_refused(
