@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from pytest_garl.reports.run_record import KindRecord, RunRecord
@@ -28,6 +28,22 @@ LEGEND = {
     "lost-while-detectable": "did not report the marker while it could be read",
 }
 """Meanings of the types of violations and findings: a signature's part before the first colon."""
+HELD_LEGEND = {
+    "I": "had a target off the marker, on something else or on nothing",
+    "II": "did not report the marker while it could be read",
+    "IV": "planned a path through a moving body",
+    "V": "gave up or had no plan, without need; or error, wrong answer, death or hang of the "
+    "landing system",
+    "late": "planned for the marker too late",
+    "off": "had a target too far from the marker, up to 1.5 m",
+}
+"""Those that mean something else where the UAV holds its place."""
+
+
+def legend_of(signatures: Iterable[str]) -> Mapping[str, str]:
+    """Return the meanings of the types, for a search or a kind with these signatures."""
+    held = any(part in ("hold", "plan") for each in signatures for part in each.split(":"))
+    return {**LEGEND, **HELD_LEGEND} if held else LEGEND
 
 
 def run_text(run: RunRecord) -> str:

@@ -10,7 +10,7 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin.terminal.summary import headline_shares, legend, search_table, share_lines
 from pytest_garl.reports.run_reading import kinds_of
-from pytest_garl.reports.run_record import SearchRecord, Spread
+from pytest_garl.reports.run_record import KindRecord, SearchRecord, Spread
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Finding, Limits
 from tests.support.results import crash, flight_result, repeated
 
@@ -115,6 +115,19 @@ def test_findings_before_another_event_follow_the_violations() -> None:
         "came down 4.8 m north of the marker, which had been in view before"
     )
     assert legend(search.findings) == "off: came down too far from the marker, up to 1.5 m"
+
+
+def test_legend_speaks_of_plans_where_the_uav_held_its_place() -> None:
+    def kinds(*signatures: str) -> list[KindRecord]:
+        return [
+            KindRecord(signature=each, slots=("lawn-g00-s00",), story="") for each in signatures
+        ]
+
+    assert legend(kinds("IV:dog:descent:seen")) == "IV: hit a moving body"
+    assert legend(kinds("IV:dog:plan:unseen", "II:lost:hold")) == (
+        "II: did not report the marker while it could be read; "
+        "IV: planned a path through a moving body"
+    )
 
 
 def test_never_giving_up_where_nobody_could_land_is_not_needless() -> None:

@@ -22,9 +22,9 @@ from pytest_garl.plugin.terminal.save_cases import saved_lines
 from pytest_garl.plugin.terminal_text import counted, width_of, wrapped
 from pytest_garl.reports.run_record import WHY_NO_LANDING, KindRecord, RunRecord, SearchRecord
 from pytest_garl.reports.run_text import (
-    LEGEND,
     PAPER_DEFINITION,
     RepeatCommand,
+    legend_of,
     percent,
 )
 from pytest_garl.search.method_catalogue import remembers
@@ -163,8 +163,9 @@ def archive_lines(run: Run) -> list[str]:
 
 def legend(kinds: Iterable[KindRecord]) -> str:
     """Return the meanings of the types of these kinds, in one line."""
-    types = {kind.type for kind in kinds}
-    return "; ".join(f"{name}: {meaning}" for name, meaning in LEGEND.items() if name in types)
+    kinds = tuple(kinds)
+    types, meanings = {kind.type for kind in kinds}, legend_of(kind.signature for kind in kinds)
+    return "; ".join(f"{name}: {meaning}" for name, meaning in meanings.items() if name in types)
 
 
 def _not_finished(record: RunRecord, run: Run, tally: Tally) -> list[str]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pytest_garl.reports.run_record import IDLE, INCONCLUSIVE, LANDED, SearchRecord
-from pytest_garl.reports.run_text import LEGEND, percent
+from pytest_garl.reports.run_text import LEGEND, legend_of, percent
 
 SIDE = 100.0
 """Charts are drawn on a square of this side; the page stretches it."""
@@ -59,10 +59,11 @@ class Plot:
 def outcome_bar(search: SearchRecord) -> tuple[Segment, ...]:
     """Return how the flights of a search ended, each in one part of a bar."""
     order = [LANDED, IDLE, *LEGEND, INCONCLUSIVE]
+    meanings = legend_of(kind.signature for kind in search.kinds)
     left, found = 0.0, []
     for kind, count in sorted(search.ends.items(), key=lambda each: order.index(each[0])):
         width = SIDE * count / search.flown
-        meaning = _NAMES.get(kind) or f"{kind}: {LEGEND[kind]}"
+        meaning = _NAMES.get(kind) or f"{kind}: {meanings[kind]}"
         text = f"{meaning}: {count} ({percent(count, search.flown)})"
         found.append(
             Segment(kind=kind, left=round(left, 3), width=round(width, 3), count=count, text=text)

@@ -14,7 +14,7 @@ from pytest_garl.reports.html.flight_tables import cut_text
 from pytest_garl.reports.html.flight_task import FlightTask, ShownFlight, task_of
 from pytest_garl.reports.html.naming import page_address, page_name, shown_file
 from pytest_garl.reports.run_record import KindRecord, RunRecord, SavedCase, SearchRecord
-from pytest_garl.reports.run_text import LEGEND
+from pytest_garl.reports.run_text import legend_of
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.verdicts.wording import headline
 
@@ -181,7 +181,7 @@ def _page(
         title=_capitalised(title) or ending,
         ending=ending if title else "",
         signature=kind.signature,
-        meaning=LEGEND.get(kind.type, ""),
+        meaning=legend_of([kind.signature]).get(kind.type, ""),
         where=search.name,
         description=cut_text(description),
         subject=subject,
