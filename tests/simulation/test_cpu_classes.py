@@ -153,7 +153,16 @@ def test_there_is_a_case_of_each_landing_system() -> None:
 @pytest.mark.parametrize(
     ("cases", "settings"),
     [
-        *(pytest.param([each], ENDS, id=each[1].system) for each in SHORT),
+        # TPHYolo-MLS has its detector in common with MM-MLS, and the rest with OpenCV-MLS.
+        *(
+            pytest.param(
+                [each],
+                ENDS,
+                id=each[1].system,
+                marks=[pytest.mark.long] if "tphyolo" in each[1].system else [],
+            )
+            for each in SHORT
+        ),
         pytest.param(SHORT, tuple(SETTINGS), id="all", marks=pytest.mark.long),
     ],
 )
