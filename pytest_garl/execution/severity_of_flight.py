@@ -41,7 +41,7 @@ def severity_of(
     """
     if not verdict.violation:
         return None
-    if verdict.violation_type == "V":
+    if flight.outcome == "crashed":
         return NO_SEVERITY
     present = tuple(name for name, _ in map.without(scenario.removed_objects).present_objects)
     if verdict.violation_type == "IV" and flight.contacts:

@@ -48,7 +48,17 @@ def test_flight_without_violation_has_none() -> None:
 
 def test_crash_of_the_landing_system_has_an_empty_one() -> None:
     crashed = flight_result("V:raised:E", violation_type="V").verdict
-    assert severity(ALL, verdict=crashed) == NO_SEVERITY
+    flight = dataclasses.replace(hits_a_person(), outcome="crashed")
+    assert severity_of(flight, crashed, ALL, LAWN, policy_spec("graded")) == NO_SEVERITY
+
+
+def test_planner_that_ended_has_the_conditions_that_acted() -> None:
+    ended = flight_result("V:no-plan:hold", violation_type="V").verdict
+    flight = dataclasses.replace(hits_a_person(), outcome="held", contacts=())
+    found = severity_of(flight, ended, ALL, LAWN, policy_spec("graded"))
+    assert found is not None
+    assert found.about == "conditions"
+    assert found.conditions
 
 
 def test_careless_person_alone_interferes_for_no_time() -> None:

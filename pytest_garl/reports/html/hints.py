@@ -32,6 +32,9 @@ def hints_of(
 ) -> tuple[str, ...]:
     """Return one or two sentences; none for an assertion of the user's own."""
     kind = verdict.violation_type
+    if evidence and evidence.holds:
+        # The hints speak of a landing.
+        return ()
     if kind == "IV":
         return (_moving(evidence.flight if evidence else None, prevention),)
     if kind in ("II", "abort") or verdict.signature.startswith("late:not-landed"):
