@@ -97,6 +97,8 @@ def test_a_case_gates_on_its_own_engine_only(searched: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["*another engine: fails by IV:dog*"])
 
 
+# The longest of all tests but this mark: five commands, each of which flies or starts pytest.
+@pytest.mark.long
 def test_commands_decide_by_the_engine_of_the_case(
     searched: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
