@@ -9,8 +9,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from pytest_garl.files.bounded_files import read_text
-from pytest_garl.files.toml import LARGEST_INTEGER, Table, parse_table
+from pytest_garl.files.user_files import LARGEST_INTEGER, Table, read_table
 from pytest_garl.messages import listed, shown
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]*")
@@ -130,7 +129,7 @@ class Experiment:
 
 def read_experiment(file: Path) -> Experiment:
     """Return the experiment in ``file``; raise ScenarioError that names file and key."""
-    top = parse_table(read_text(file), str(file))
+    top = read_table(file)
     top.refuse_unknown(TOP_KEYS)
     systems = top.table("systems")
     names = {_named(systems, name): systems.string(name) for name in systems.values}

@@ -38,8 +38,7 @@ from pytest_garl.cases.case_sections import (
 )
 from pytest_garl.errors import ScenarioError
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
-from pytest_garl.files.bounded_files import read_text
-from pytest_garl.files.toml import Table, finite, parse_table, quoted
+from pytest_garl.files.user_files import Table, finite, parse_table, quoted, read_text
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.files import SCENARIO_KEYS, is_in_units, read_scenario, scenario_lines
 from pytest_garl.scenarios.genes import ENVIRONMENT

@@ -9,8 +9,7 @@ from typing import cast, get_args
 
 from pytest_garl.cases.case import Case, NoGateReason, Status, asserting_test
 from pytest_garl.execution.reference import SYSTEM_NAME
-from pytest_garl.files.bounded_files import read_text
-from pytest_garl.files.toml import Table, parse_table, quoted
+from pytest_garl.files.user_files import Table, parse_table, quoted, read_text
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.files import absent_line
 from pytest_garl.scenarios.maps.map import Map

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 
 from pytest_garl.cases.case import Escape, Preventable
 from pytest_garl.engine import Engine
-from pytest_garl.files.toml import LARGEST_INTEGER, Table, quoted
+from pytest_garl.files.user_files import LARGEST_INTEGER, Table, quoted
 from pytest_garl.messages import printable
 from pytest_garl.scenarios.story import GRADES
 from pytest_garl.verdicts.verdict import (

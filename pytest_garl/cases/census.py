@@ -22,7 +22,7 @@ from pytest_garl.cases.case_header import CaseHeader
 from pytest_garl.cases.collected_tests import CollectedProject
 from pytest_garl.cases.corpus import Corpus, CorpusEntry, committed_cases, folder_of
 from pytest_garl.execution.sources import module_file
-from pytest_garl.files.bounded_files import MEGABYTE
+from pytest_garl.files.user_files import MEGABYTE
 from pytest_garl.program import program_named
 
 _SIGNS_OF_A_CASE = (b"\ntrajectory_sha256 =", b"\n[violation]")

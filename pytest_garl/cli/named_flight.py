@@ -15,9 +15,8 @@ from pytest_garl.cli.shared import LEDGER, say
 from pytest_garl.errors import GarlError, LedgerError
 from pytest_garl.execution.flight_id import FIRST_SLOT, LIVE, OF_CASE
 from pytest_garl.execution.stored_ledger import checked_ledger, flown_slots
-from pytest_garl.files.bounded_files import read_text
 from pytest_garl.files.run_files import REPEAT_LEDGER
-from pytest_garl.files.toml import parse
+from pytest_garl.files.user_files import read_table
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import airframe_of
@@ -144,7 +143,7 @@ class FlightName:
     def _of_file(self, file: Path) -> NamedFlight:
         flight, place = load(file), None
         if self.scenario is not None and self.system is not None:
-            is_case = "evidence" in parse(read_text(self.scenario), str(self.scenario))
+            is_case = "evidence" in read_table(self.scenario).values
             scenario = (
                 load_case(self.scenario, _MAPS).scenario
                 if is_case
@@ -300,7 +299,7 @@ def _case_file(file: Path) -> Path:
         raise GarlError(
             f"{file}: found nothing, expected a saved case; `garl cases list` lists them"
         )
-    values = parse(read_text(file), str(file))
+    values = read_table(file).values
     if "evidence" not in values:
         slot = FIRST_SLOT.id(shortened(str(values.get("map", "MAP"))))
         raise GarlError(

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.errors import GarlError
-from pytest_garl.files.bounded_files import MEGABYTE, read_bytes
 from pytest_garl.files.json_values import dataclass_from, parse_json
+from pytest_garl.files.user_files import MEGABYTE, read_bytes
 from pytest_garl.flight.flight import MarkerView
 
 Array = NDArray[np.float64]

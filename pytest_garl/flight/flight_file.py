@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from pytest_garl.airframe import Rangefinder
 from pytest_garl.errors import GarlError, NotFiniteError
 from pytest_garl.files.arrays import unpack
-from pytest_garl.files.bounded_files import MEGABYTE, read_bytes
 from pytest_garl.files.json_values import dataclass_from, parse_json
+from pytest_garl.files.user_files import MEGABYTE, read_bytes
 from pytest_garl.flight.flight import (
     Contact,
     Crash,

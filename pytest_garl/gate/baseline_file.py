@@ -11,8 +11,7 @@ from pytest_garl.cases.case_file import read_limits
 from pytest_garl.engine import Engine, engine_of
 from pytest_garl.errors import BaselineError, GarlError, ScenarioError
 from pytest_garl.files.atomic import write_text_atomically
-from pytest_garl.files.bounded_files import MEGABYTE, read_text
-from pytest_garl.files.toml import Table, parse_table, quoted
+from pytest_garl.files.user_files import MEGABYTE, Table, parse_table, quoted, read_text
 from pytest_garl.gate.pairs import FlightSummary
 from pytest_garl.gate.rows import RowReader, is_sparse, listed_genes, row_text
 from pytest_garl.messages import shown

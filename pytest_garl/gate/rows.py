@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, get_args
 
-from pytest_garl.files.toml import LARGEST_INTEGER, Table, finite, quoted
+from pytest_garl.files.user_files import LARGEST_INTEGER, Table, finite, quoted
 from pytest_garl.flight.flight import Outcome
 from pytest_garl.gate.pairs import NOT_LANDED, FlightSummary, NoLanding
 from pytest_garl.messages import listed, printable, shown

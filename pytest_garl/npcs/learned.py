@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from pytest_garl.errors import PolicyError
 from pytest_garl.files.arrays import unpack
-from pytest_garl.files.bounded_files import MEGABYTE, read_bytes
 from pytest_garl.files.json_values import parse_json
+from pytest_garl.files.user_files import MEGABYTE, read_bytes
 from pytest_garl.messages import listed, shown
 from pytest_garl.npcs.director import FEATURES, WAITING, LearnedDirector
 from pytest_garl.npcs.encodings import ENCODINGS, on_turn

@@ -28,7 +28,6 @@ from pytest_garl.shrinking.plan import FEWEST_FOR_VIOLATION
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.domains.domain import Domain
-    from pytest_garl.scenarios.use_file import UseFile
 
 _URL = re.compile(r"[\w.~:/?#@!$&*+,;=%-]+", re.ASCII)
 """An address without what ends it in Markdown or HTML."""
@@ -85,8 +84,8 @@ class Options:
     """When a search flies the probes of a landing system before."""
     archive: Path | None
     """The file that carries what searches know to later ones."""
-    use: UseFile | None
-    """The model of use, if the method draws from one."""
+    use: Path | None
+    """The file of the model of use, if the method draws from one."""
     cases: Path
     cases_named: bool
     """Whether the ini file or the command line names the folder of the cases."""
@@ -255,8 +254,8 @@ def _file(config: pytest.Config, key: str) -> Path | None:
     return config.rootpath / text if text else None
 
 
-def _use(config: pytest.Config, method: str) -> UseFile | None:
-    """Return the model of use, which only one method needs."""
+def _use(config: pytest.Config, method: str) -> Path | None:
+    """Return the file of the model of use, which only one method needs."""
     if method != USE:
         return None
     path = _file(config, "garl_use")
@@ -265,12 +264,9 @@ def _use(config: pytest.Config, method: str) -> UseFile | None:
             "garl_use: found no file, expected that of the model of use from which "
             f"--garl-method={USE} draws: `garl domain use field >use.toml` prints one to edit"
         )
-    from pytest_garl.scenarios.use_file import read_use
-
-    try:
-        return read_use(path)
-    except GarlError as error:
-        raise pytest.UsageError(f"garl_use: {error}") from error
+    if not path.is_file():
+        raise _refused("garl_use", str(path), "a file that `garl domain use` printed")
+    return path
 
 
 def _report(config: pytest.Config) -> Path | None:

@@ -7,9 +7,8 @@ import json
 from pathlib import Path
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.files.bounded_files import read_text
 from pytest_garl.files.json_values import dataclass_from, parse_json
-from pytest_garl.files.toml import Table, parse_table, quoted
+from pytest_garl.files.user_files import Table, parse_table, quoted, read_text
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.genome_like import genome_like
 from pytest_garl.scenarios.groups import GROUPS, QUANTITIES

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 from pytest_garl.errors import ScenarioError, of_a_user
 from pytest_garl.fiducial import MarkerSpec, NestedMarker
-from pytest_garl.files.toml import Table, finite, quoted
+from pytest_garl.files.user_files import Table, finite, quoted
 from pytest_garl.messages import shown
 
 __tracebackhide__ = of_a_user

@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.files.bounded_files import read_text
-from pytest_garl.files.toml import Table, parse_table, quoted
+from pytest_garl.files.user_files import Table, parse_table, quoted, read_text
 from pytest_garl.messages import listed, shown
 from pytest_garl.scenarios.genes import SUN, Genome, NuclearGene
 from pytest_garl.scenarios.groups import DECIDED, DECOY_KINDS, GROUPS, WEATHER, WEATHER_CAUSES

@@ -25,8 +25,8 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import simulator_sha256
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.files.atomic import write_bytes_atomically
-from pytest_garl.files.bounded_files import read_bytes
 from pytest_garl.files.json_values import dataclass_from, parse_json
+from pytest_garl.files.user_files import read_bytes
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import Genome

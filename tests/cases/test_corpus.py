@@ -13,7 +13,7 @@ from pytest_garl.cases.case import NoGateReason, Status
 from pytest_garl.cases.case_file import dump_case, load_case
 from pytest_garl.cases.corpus import Corpus, patch_of, read_acceptance, replace_file
 from pytest_garl.errors import CorpusError
-from pytest_garl.files import bounded_files
+from pytest_garl.files import user_files
 from pytest_garl.scenarios.maps import map as package
 from pytest_garl.scenarios.maps.loading import load_map
 from tests.cases.samples import OBJECT_NAMES, SYSTEM, case
@@ -59,7 +59,7 @@ def test_patch_creates_the_file(tmp_path: Path) -> None:
 def test_corpus_reads_each_file_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Corpus(tmp_path).save(case())
     corpus, read = Corpus(tmp_path), []
-    real = bounded_files.read_text
+    real = user_files.read_text
 
     def counted(path: Path) -> str:
         read.append(path.name)

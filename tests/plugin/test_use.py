@@ -88,7 +88,7 @@ def test_a_run_without_a_sample_of_use_says_what_to_run(flown: Path) -> None:
     ("args", "message"),
     [
         (("--garl-method=use",), "garl_use: found no file, expected that of the model of use"),
-        (("--garl-method=use", "-o", "garl_use=no.toml"), "garl_use: "),
+        (("--garl-method=use", "-o", "garl_use=no.toml"), "garl_use: found "),
     ],
 )
 def test_a_missing_model_of_use_is_one_usage_error(

@@ -11,8 +11,7 @@ import pytest
 from pytest_garl.errors import GarlError, ScenarioError
 from pytest_garl.execution.flight_id import Slot
 from pytest_garl.execution.stored_ledger import StoredSlot, read_slot
-from pytest_garl.files.bounded_files import read_text
-from pytest_garl.files.toml import parse
+from pytest_garl.files.user_files import parse, read_text
 from pytest_garl.messages import command
 from pytest_garl.plugin.items.target import Target
 from pytest_garl.plugin.options import SLOT_ID, Options

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from pytest_garl.cpu_dispatch import libraries_off_baseline
@@ -27,6 +28,7 @@ from pytest_garl.scenarios.domains.own_navigation import within
 from pytest_garl.scenarios.files import load
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.use_file import UseFile, read_use
 from pytest_garl.search.archive import Archive, Knowledge, flown_by
 from pytest_garl.search.breeder import Breeder
 from pytest_garl.search.fixed import FixedScenarios
@@ -54,6 +56,11 @@ class Searches:
     """Trains the directors of the searches."""
     method_process: MethodProcess = field(default_factory=MethodProcess)
     """Breeds for them if this process computes otherwise than others do."""
+
+    @cached_property
+    def model_of_use(self) -> UseFile | None:
+        """The model of use, if the method draws from one."""
+        return read_use(self.options.use) if self.options.use else None
 
     def close(self) -> None:
         """End the processes of the searches."""
@@ -191,7 +198,7 @@ class Searches:
             population=self.options.population,
             known=own.known,
             suspects=own.suspects,
-            use=self.options.use,
+            use=self.model_of_use,
         )
         name = self.options.method
         if name in method_names() and libraries_off_baseline():

@@ -28,6 +28,7 @@ from pytest_garl.plugin.session.run import Run
 from pytest_garl.plugin.termination import interrupt_on_sigterm
 from pytest_garl.plugin.xdist import is_xdist_worker
 from pytest_garl.process_tree import alive
+from pytest_garl.scenarios.use_file import read_use
 from pytest_garl.search.archive import Archive, read_archive
 
 if TYPE_CHECKING:
@@ -149,7 +150,7 @@ def _facts(options: Options, archive: str | None = None) -> dict[str, Any]:
         domain=options.domain.label,
         npcs=options.policy_in(options.domain),
         archive=archive,
-        use=options.use.sha256 if options.use else None,
+        use=read_use(options.use).sha256 if options.use else None,
     )
 
 

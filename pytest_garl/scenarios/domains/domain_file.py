@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import cast, get_args
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.files.bounded_files import read_text
-from pytest_garl.files.toml import Table, parse_table
+from pytest_garl.files.user_files import Table, parse_table, read_text
 from pytest_garl.messages import listed, shown
 from pytest_garl.scenarios.domains.domain import ABSENT, BIRD_HEIGHT, CONDITIONS, ELEVATION, Domain
 from pytest_garl.scenarios.domains.names import BUILT_IN

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.files.toml import parse
+from pytest_garl.files.user_files import parse
 
 
 @pytest.mark.parametrize(

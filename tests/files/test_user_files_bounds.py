@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import PolicyError, ScenarioError
-from pytest_garl.files.bounded_files import read_bytes, read_text
+from pytest_garl.files.user_files import read_bytes, read_text
 
 
 def test_a_file_is_read_as_it_is(tmp_path: Path) -> None:
