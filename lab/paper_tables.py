@@ -1,7 +1,8 @@
 """Write the paper's tables beside those of this code: ``python -m lab.paper_tables``.
 
 The rows are those of ``docs/results/experiments/paper.csv``, which ``python -m lab.experiment
-docs/results/experiments/paper.toml`` flies; the page is ``docs/results/paper.md``.
+docs/results/experiments/paper.toml`` flies, and of ``paper-differences.csv`` beside it, which
+``python -m lab.paper_differences`` flies; the page is ``docs/results/paper.md``.
 """
 
 from __future__ import annotations
@@ -18,12 +19,14 @@ from lab.experiment.results import ResultRow, read_rows
 from lab.experiment.spec import Experiment, read_experiment
 from lab.experiment.tables import NONE, markdown
 from lab.judges.intervals import p_of_signs
+from lab.paper_differences import COUNTS, SEEDS, SYSTEMS, TABLE, WORLDS
+from lab.table import Row
 
 ROOT = Path(__file__).parents[1]
 SPEC = ROOT / "docs" / "results" / "experiments" / "paper.toml"
 PAGE = ROOT / "docs" / "results" / "paper.md"
-BEGIN = "<!-- tables: python -m lab.paper_tables -->\n"
-END = "<!-- end of the tables -->\n"
+BEGIN = "<!-- {}: python -m lab.paper_tables -->\n"
+END = "<!-- end of the {} -->\n"
 OWN = "garl-paper"
 """The method of the paper."""
 
@@ -163,14 +166,59 @@ def _per_100(searches: MethodSearches, count_of: Callable[[ResultRow], int]) -> 
     return f"{100 * searches.sum_of(count_of) / flights:.1f}" if flights else NONE
 
 
+def differences(rows: Sequence[Row]) -> str:
+    """Return the tables of the worlds between the paper's and ours, in Markdown."""
+    count = len(WORLDS) * len(SYSTEMS) * len(SEEDS)
+    shares, pairs = [], []
+    for system in SYSTEMS:
+        for world in WORLDS:
+            own = [row for row in rows if (row["system"], row["world"]) == (system, world)]
+            flights = sum(int(row["flights"]) for row in own)
+            cells = [
+                f"{100 * sum(int(row[name]) for row in own) / flights:.1f}" if flights else NONE
+                for name in COUNTS
+            ]
+            shares.append([system, world, *cells, str(len(own))])
+    found = {(row["system"], row["seed"], row["world"]): row for row in rows}
+    for world in WORLDS:
+        keys = [
+            (system, str(seed))
+            for system in SYSTEMS
+            for seed in SEEDS
+            if (system, str(seed), world) in found and (system, str(seed), "ours") in found
+        ]
+        if world != "ours" and keys:
+            lines = [(found[*key, world], found[*key, "ours"]) for key in keys]
+            gaps = (
+                [int(own[name]) - int(other[name]) for own, other in lines] for name in COUNTS[:3]
+            )
+            pairs.append(
+                [world, str(len(keys)), *(f"{np.mean(g):+.1f} ({p_of_signs(g):.3f})" for g in gaps)]
+            )
+    header = ("paper's definition, %", "our definition, %", "its code, %", *COUNTS[3:])
+    parts = [
+        f"{len(rows)} of {count} searches of 100 flights are flown.",
+        markdown(("system", "world", *header, "seeds"), shares),
+        markdown(("world less ours", "pairs", *header[:3]), pairs) if pairs else "",
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
 def with_tables(page: str) -> str:
     """Return the page with the tables of today's rows."""
-    head, begin, rest = page.partition(BEGIN)
-    _, end, tail = rest.partition(END)
-    if not begin or not end:
-        raise SystemExit(f"{PAGE}: found no lines {BEGIN!r} and {END!r}")
     experiment = read_experiment(SPEC)
-    return f"{head}{begin}\n{tables(experiment, read_rows(experiment.rows))}\n{end}{tail}"
+    page = _with(page, "tables", tables(experiment, read_rows(experiment.rows)))
+    return _with(page, "differences", differences(TABLE.rows()))
+
+
+def _with(page: str, name: str, text: str) -> str:
+    """Return the page with a text between the two lines that name it."""
+    first, last = BEGIN.format(name), END.format(name)
+    head, begin, rest = page.partition(first)
+    _, end, tail = rest.partition(last)
+    if not begin or not end:
+        raise SystemExit(f"{PAGE}: found no lines {first!r} and {last!r}")
+    return f"{head}{begin}\n{text}\n{end}{tail}"
 
 
 if __name__ == "__main__":

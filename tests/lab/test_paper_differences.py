@@ -1,0 +1,112 @@
+"""The worlds between the paper's and ours: what each changes, and what the paper's code counts."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lab.paper_differences import (
+    COUNTS,
+    MAP,
+    SEEDS,
+    SYSTEMS,
+    WORLDS,
+    keys,
+    violates_in_its_code,
+    with_decoy,
+    without_limits,
+)
+from lab.paper_tables import differences
+from pytest_garl.flight.flight import TRACK_RATE_HZ
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.placed import Placed
+from pytest_garl.scenarios.validity import problems
+from pytest_garl.simulation.physics.locomotion import next_course
+from tests.support.recorded_flights import hit_by_dog, recorded
+
+
+@pytest.mark.parametrize("kind", OBJECT_TYPES.values(), ids=lambda kind: str(kind.name))
+def test_npcs_without_limits_turn_and_stop_at_once(kind: object) -> None:
+    before = dataclasses.asdict(kind)  # type: ignore[call-overload]
+    with without_limits():
+        body = OBJECT_TYPES[before["name"]]
+        assert body.speed_mps(1.0) == 3.0
+        course, speed = next_course(body, (3.0, 0.0), 0.0, (-3.0, 0.0), 1 / 240, body.flies)
+        assert math.cos(course) == pytest.approx(-1.0)
+        _, faster = next_course(body, (-speed, 0.0), math.pi, (-3.0, 0.0), 1 / 240, body.flies)
+        assert faster == pytest.approx(3.0)
+    assert dataclasses.asdict(kind) == before  # type: ignore[call-overload]
+
+
+def test_limits_come_back_after_an_error() -> None:
+    before = OBJECT_TYPES["dog"].top_speed_mps
+    with pytest.raises(ZeroDivisionError), without_limits():
+        raise ZeroDivisionError
+    assert OBJECT_TYPES["dog"].top_speed_mps == before
+
+
+def test_a_decoy_lies_where_the_seed_says_and_where_it_may() -> None:
+    places, genome = set(), genome_for(MAP)
+    for seed in range(8):
+        scenario = with_decoy(decode(genome.nominal, genome, map=MAP.name, seed=seed))
+        (decoy,) = Placed(scenario, MAP).decoys
+        assert decoy.kind == "other-id"
+        assert math.dist(decoy.place_m, MAP.gps_position_m) <= 7.5 + 1e-6
+        assert not [each for each in problems(scenario, MAP) if "decoy" in each]
+        places.add(decoy.place_m)
+    assert len(places) == 8
+
+
+def path(*points: tuple[float, float, float, float]) -> NDArray[np.float64]:
+    """Return places at the track's rate through points (s, x, y, z)."""
+    corners = np.array(points)
+    times = np.arange(round(corners[-1, 0] * TRACK_RATE_HZ) + 1) / TRACK_RATE_HZ
+    return np.column_stack([np.interp(times, corners[:, 0], row) for row in corners[:, 1:].T])
+
+
+HOVER_FIRST = path((0, 3, 0, 0), (5, 0, 0, 9), (26, 0, 0, 9), (40, 8, 0, 0))
+"""Takes off 3 m off the marker, hovers 21 s above it, and comes down 8 m off."""
+
+
+def test_a_uav_that_hovers_above_the_marker_has_landed_in_its_code() -> None:
+    flight = recorded(steps=(), places=HOVER_FIRST)
+    assert not violates_in_its_code(flight, 20.0)
+    # It moved before 25 s were over, so the end counts.
+    assert violates_in_its_code(flight, 25.0)
+
+
+def test_its_code_sees_collisions_until_the_uav_is_still() -> None:
+    for time_s, counts in ((4.0, True), (24.9, True), (27.0, False)):
+        flight = recorded(steps=(), places=HOVER_FIRST, contacts=(hit_by_dog(time_s),))
+        assert violates_in_its_code(flight, 20.0) is counts
+    tree = dataclasses.replace(hit_by_dog(4.0), body="tree-1", kind="tree", body_class="static")
+    flight = recorded(steps=(), places=HOVER_FIRST, contacts=(tree,))
+    assert not violates_in_its_code(flight, 20.0)
+
+
+def test_the_wait_on_the_ground_before_take_off_ends_no_flight() -> None:
+    waits = path((0, 3, 0, 0), (25, 3, 0, 0), (30, 0, 0, 9), (40, 0.5, 0, 0))
+    assert not violates_in_its_code(recorded(steps=(), places=waits), 20.0)
+
+
+def test_tables_name_each_world_and_pair_it_with_ours() -> None:
+    assert len(list(keys())) == len(SYSTEMS) * len(WORLDS) * len(SEEDS)
+    rows = [
+        dict(zip(("system", "world", "seed"), key, strict=True))
+        | {"flights": "100", "sha256": ""}
+        | dict.fromkeys(COUNTS, "30" if key[1] == "npcs" else "20")
+        for key in keys(["MM-MLS"])
+        if key[1] in ("ours", "npcs")
+    ]
+    text = differences(rows)
+    assert text.startswith("6 of 45 searches of 100 flights are flown.")
+    assert "| MM-MLS | npcs | 30.0 | 30.0 | 30.0 |" in text
+    assert "| OpenCV-MLS | all | – | – | – |" in text
+    # Of the eight ways to flip the signs of three equal differences two are as extreme.
+    assert "| npcs | 3 | +10.0 (0.250) | +10.0 (0.250) | +10.0 (0.250) |" in text
