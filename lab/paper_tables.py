@@ -19,6 +19,7 @@ from lab.experiment.results import ResultRow, read_rows
 from lab.experiment.spec import Experiment, read_experiment
 from lab.experiment.tables import NONE, markdown
 from lab.judges.intervals import p_of_signs
+from lab.paper_claims import OWN, WEATHER_DISTANCE, claim_lines
 from lab.paper_differences import COUNTS, SEEDS, SYSTEMS, TABLE, WORLDS
 from lab.table import Row
 
@@ -27,8 +28,6 @@ SPEC = ROOT / "docs" / "results" / "experiments" / "paper.toml"
 PAGE = ROOT / "docs" / "results" / "paper.md"
 BEGIN = "<!-- {}: python -m lab.paper_tables -->\n"
 END = "<!-- end of the {} -->\n"
-OWN = "garl-paper"
-"""The method of the paper."""
 
 PUBLISHED_SHARES = MappingProxyType(
     {
@@ -67,9 +66,6 @@ TYPES: Mapping[str, Callable[[ResultRow], int]] = MappingProxyType(
         "IV": lambda row: row.type_iv,
         "V": lambda row: row.type_v,
     }
-)
-WEATHER_DISTANCE = Metric(
-    title="distance of weather", value_of=lambda row: row.weather_distance, digits=2
 )
 
 
@@ -166,6 +162,11 @@ def _per_100(searches: MethodSearches, count_of: Callable[[ResultRow], int]) -> 
     return f"{100 * searches.sum_of(count_of) / flights:.1f}" if flights else NONE
 
 
+def claims(rows: Sequence[ResultRow]) -> str:
+    """Return the table of the paper's claims, in Markdown."""
+    return markdown(("claim", "paper", "here", "verdict"), claim_lines(rows)) + "\n"
+
+
 def differences(rows: Sequence[Row]) -> str:
     """Return the tables of the worlds between the paper's and ours, in Markdown."""
     count = len(WORLDS) * len(SYSTEMS) * len(SEEDS)
@@ -207,7 +208,9 @@ def differences(rows: Sequence[Row]) -> str:
 def with_tables(page: str) -> str:
     """Return the page with the tables of today's rows."""
     experiment = read_experiment(SPEC)
-    page = _with(page, "tables", tables(experiment, read_rows(experiment.rows)))
+    rows = read_rows(experiment.rows)
+    page = _with(page, "tables", tables(experiment, rows))
+    page = _with(page, "claims", claims(rows))
     return _with(page, "differences", differences(TABLE.rows()))
 
 
