@@ -39,9 +39,8 @@ class Recorded:
         """Begin with the first move; raise PolicyError if the NPC has no recorded moves."""
         name = situation.self.name
         if name not in self._all:
-            raise PolicyError(
-                f"recorded moves: none for {name}; found moves of {', '.join(self._all)}"
-            )
+            found = ", ".join(self._all) or "nobody"
+            raise PolicyError(f"recorded moves: none for {name}; found moves of {found}")
         self._moves = enumerate(self._all[name])
         self._own = self._changes.get(name, [])
         self._last: tuple[float, float] = (0.0, 0.0)

@@ -223,6 +223,12 @@ class PolicySpec:
                 f"NPC policy {self.name!r}: {self.factory!r} cannot be loaded ({error}); "
                 "expected 'module:attribute' of an importable module"
             ) from error
+        except Exception as error:
+            # A user's own module may raise anything.
+            raise PolicyError(
+                f"NPC policy {self.name!r}: importing {module!r} raised "
+                f"{type(error).__name__}: {error}"
+            ) from error
 
     def make(self) -> NpcPolicy:
         """Return a fresh policy for one NPC; raise PolicyError if it cannot be made."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, get_args
 
 from pytest_garl.airframe import Airframe
 from pytest_garl.errors import LandingSystemError
@@ -76,14 +76,18 @@ class Px4Copter:
 
     ``parameters`` are PX4's (``{"COM_OBL_RC_ACT": 4}``).  ``pilot`` is the mode into which a human
     pilot switches after a take-off and a flight to the mission's coordinate: "LAND" stands for
-    AUTO.PRECLAND.  Raises LandingSystemError for a parameter that is not simulated, and for a value
-    that is not finite.
+    AUTO.PRECLAND.  Raises LandingSystemError for a parameter that is not simulated, for a value
+    that is not finite, and for another mode.
     """
 
     parameters: Mapping[str, float] = field(default_factory=dict)
     pilot: Pilot = ""
 
     def __post_init__(self) -> None:
+        if self.pilot not in get_args(Pilot):
+            raise LandingSystemError(
+                f"Px4Copter.pilot = {self.pilot!r}: expected 'LAND' or 'LOITER', or '' for none"
+            )
         for name, value in self.parameters.items():
             if name not in DEFAULTS or not math.isfinite(value):
                 raise LandingSystemError(

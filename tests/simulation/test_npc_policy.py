@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from pytest_garl.errors import PolicyError
@@ -31,6 +33,15 @@ def test_a_specification_makes_a_policy_with_its_arguments() -> None:
 def test_a_policy_that_cannot_be_loaded_is_an_error(factory: str) -> None:
     with pytest.raises(PolicyError, match=r"'mine': .* cannot be loaded .*'module:attribute'"):
         PolicySpec(name="mine", factory=factory).make()
+
+
+def test_a_policy_module_that_raises_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "raising_policy.py").write_text("1 / 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(PolicyError, match="importing 'raising_policy' raised ZeroDivisionError"):
+        PolicySpec(name="mine", factory="raising_policy:Policy").make()
 
 
 def test_arguments_that_the_policy_does_not_take_are_an_error() -> None:

@@ -126,3 +126,8 @@ def test_its_modes_have_px4s_numbers() -> None:
 def test_an_unknown_parameter_is_refused() -> None:
     with pytest.raises(LandingSystemError, match="found LAND_SPEED = 1; expected a finite number"):
         Px4Copter(parameters={"LAND_SPEED": 1})
+
+
+def test_a_mode_that_no_pilot_switches_to_is_refused() -> None:
+    with pytest.raises(LandingSystemError, match="pilot = 'POSCTL': expected 'LAND' or 'LOITER'"):
+        Px4Copter(pilot="POSCTL")  # type: ignore[arg-type]

@@ -338,7 +338,10 @@ class Link {
 
  private:
   json::Writer begin(const std::string& type) {
-    if (!waits_) throw std::logic_error("a second command for one frame; the first one is flown");
+    if (!waits_)
+      throw std::logic_error(
+          "a command without a frame: before the first one, or a second one for it; expected one "
+          "command for each frame");
     waits_ = false;
     json::Writer answer;
     answer.key("type") << type;

@@ -105,7 +105,10 @@ class Link:
     def send(self, kind: str, **fields: Any) -> None:
         """Answer the frame; every command may have the field ``diagnostics``, a dict."""
         if self._frame is None:
-            raise RuntimeError("a second command for one frame; the first one is flown")
+            raise RuntimeError(
+                "a command without a frame: before the first one, or a second one for it; expected "
+                "one command for each frame"
+            )
         self._write(dict(fields, type=kind, frame=self._frame))
         self._frame = None
 
