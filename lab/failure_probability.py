@@ -21,6 +21,10 @@ draws.
 
 compares the estimate of one such folder with the plain draws of another, and judges the rules that
 are learned from the first on the flights of the second.
+
+    python -m lab.failure_probability resample TRUTH
+
+repeats searches as the stand-in does, but they draw from the plain draws of such a folder.
 """
 
 from __future__ import annotations
@@ -347,6 +351,21 @@ def compare(truth: Path, estimated: Path) -> Iterator[Mapping[str, Any]]:
         yield _flown_row(f"rule: {kind}", rule.covered, rule.hits, rule.precision, low, high, words)
 
 
+def resample(folder: Path, searches: int) -> Iterator[Mapping[str, Any]]:
+    """Yield the rows of the arms whose searches draw from the flights of a folder."""
+    with closing(Ledger(_ledger(folder))) as ledger:
+        flights = [each for each in ledger.queries.flights() if not each.result.inconclusive]
+    pool = Flights(
+        rows=np.array([encode(parse_scenario(each.scenario), GENOME) for each in flights]),
+        proximity=np.array([proximities(each.result) for each in flights]),
+        violates=np.array([float(each.result.verdict.violation) for each in flights]),
+    )
+    for arm in ARMS:
+        # An archive would need searches of its own.
+        if arm != "archive":
+            yield row_of("OpenCV-MLS", arm, pool, searches, ())
+
+
 def _flown_row(
     what: str, flights: int, failing: int, share: float, low: float, high: float, words: str = ""
 ) -> Mapping[str, Any]:
@@ -387,11 +406,16 @@ def main() -> None:
     comparing = commands.add_parser("compare")
     comparing.add_argument("truth", type=Path)
     comparing.add_argument("estimate", type=Path)
+    again = commands.add_parser("resample")
+    again.add_argument("truth", type=Path)
+    again.add_argument("--searches", type=int, default=500)
     named = parser.parse_args()
     if named.command == "stand-in":
         simulate(named.draws, named.searches, named.workers)
     elif named.command == "fly":
         sys.exit(fly(named.folder, named.flights, named.seed, named.workers, plain=named.plain))
+    elif named.command == "resample":
+        TABLE.append(resample(named.truth, named.searches))
     else:
         FLOWN_TABLE.append(compare(named.truth, named.estimate))
 
