@@ -158,7 +158,8 @@ def _interference_s(
     """Return how long a body interfered until the contact, as far as its track shows it.
 
     A hostile one attacks during the whole flight.  One that sees the UAV in part interferes from
-    when it is near enough to see it, and its mind has noticed; solids between them do not count.
+    when it is near enough to see it, and has had the time to notice it; solids between them do not
+    count.
     """
     if grade == "hostile":
         return round(contact.time_s, CENTIMETRES)

@@ -11,11 +11,11 @@ import numpy as np
 
 from pytest_garl.errors import PolicyError
 from pytest_garl.messages import shown
+from pytest_garl.npcs.decision_rules import Intercepting
 from pytest_garl.npcs.director import Director, LearnedDirector, TimeToGo, Watch
 from pytest_garl.npcs.director_progress import AND_EVENTS
 from pytest_garl.npcs.event_watch import STRIKING, LearnedStrikes
 from pytest_garl.npcs.interference import Interfering
-from pytest_garl.npcs.minds import Intercepting
 from pytest_garl.scenarios.story import story_of, waits_for_decision
 from pytest_garl.simulation.npc_policy import EventDirector, Move, Situation
 

@@ -11,9 +11,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from pytest_garl.npcs.exit_path import ExitPath
 from pytest_garl.npcs.grades import GRADE_LIMITS, GradeLimits
 from pytest_garl.npcs.steering import towards
-from pytest_garl.npcs.way_out import WayOut
 from pytest_garl.scenarios.bodies import Disc, discs_of
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.story import APPROACH_S, LIMITS_S, Story, story_of
@@ -117,7 +117,7 @@ class Belief(Situation):
     keeps_m: float
 
 
-class Mind(Protocol):
+class DecisionRule(Protocol):
     """Decides where an NPC goes that perceives the UAV in part."""
 
     def decide(self, belief: Belief) -> Move:
@@ -125,7 +125,7 @@ class Mind(Protocol):
 
 
 class Interference:
-    """The part of one NPC without its mind: when it comes, what it perceives, when it leaves.
+    """The part of one NPC without its decisions: when it comes, what it perceives, when it leaves.
 
     It comes after its phase and goes to the marker until it perceives the UAV.  From then on it
     interferes, until its time is over or it perceived nothing for :data:`APPROACH_S`; it leaves.
@@ -137,7 +137,7 @@ class Interference:
         self._limits: GradeLimits = GRADE_LIMITS[grade]
         self._lasts_s = min(self._story.lasts_s, LIMITS_S[grade])
         self._perception = Perception(self._limits, situation.map)
-        self._way_out: WayOut | None = None
+        self._exit: ExitPath | None = None
         self._move = STAY
         self._asked_s = -math.inf
         self._ends_s = math.inf
@@ -145,13 +145,13 @@ class Interference:
     @property
     def is_over(self) -> bool:
         """Whether it is leaving."""
-        return self._way_out is not None
+        return self._exit is not None
 
     def look(self, situation: Situation) -> Belief | None:
         """Take a situation in; return what the NPC believes if it decides now."""
         self._perception.update(situation)
         now, begins_s = situation.time_s, self._story.begins_s(situation.moments_s)
-        if now < begins_s or self._way_out is not None:
+        if now < begins_s or self._exit is not None:
             return None
         sighting = self._perception.sighting
         if math.isinf(self._ends_s) and sighting is not None:
@@ -159,7 +159,7 @@ class Interference:
         if now >= min(self._ends_s, begins_s + APPROACH_S + self._lasts_s):
             # One that keeps away from the UAV turns back; another one goes straight on.
             last = (self._move.x, self._move.y) if self._limits.keeps_m == 0 else (0.0, 0.0)
-            self._way_out = WayOut(situation, last, LEAVES_TO_M)
+            self._exit = ExitPath(situation, last, LEAVES_TO_M)
             return None
         if now - self._asked_s < self._limits.decides_every_s - 1e-6:
             return None
@@ -175,15 +175,15 @@ class Interference:
 
     def move(self, situation: Situation) -> Move:
         """Return the move until the next situation."""
-        move = self._move if self._way_out is None else self._way_out.decide(situation)
+        move = self._move if self._exit is None else self._exit.decide(situation)
         return kept_away(move, self._perception.sighting, situation, self._limits.keeps_m)
 
 
 class Interfering:
-    """An NPC policy: an interference with a mind."""
+    """An NPC policy: an interference with a rule of decision."""
 
-    def __init__(self, grade: str, mind: Mind) -> None:
-        self.grade, self._mind = grade, mind
+    def __init__(self, grade: str, rule: DecisionRule) -> None:
+        self.grade, self._rule = grade, rule
 
     @property
     def is_over(self) -> bool:
@@ -198,7 +198,7 @@ class Interfering:
         """Return the move until the next decision."""
         belief = self._interference.look(situation)
         if belief is not None:
-            self._interference.answer(self._mind.decide(belief))
+            self._interference.answer(self._rule.decide(belief))
         return self._interference.move(situation)
 
 

@@ -114,12 +114,12 @@ class LearnedPolicy:
 
 
 def shipped(grade: str) -> str:
-    """Return the path of the weights of a grade's mind."""
+    """Return the path of the weights of a grade."""
     return str(WEIGHTS / "grades" / f"{grade}.npz")
 
 
-class LearnedMind:
-    """The mind of an NPC that perceives the UAV in part: the best action by weights in a file.
+class LearnedRule:
+    """Decides for an NPC that perceives the UAV in part: the best action by weights in a file.
 
     Without a hash the one in the manifest holds.  Raises PolicyError if the file is missing or
     damaged, or has another hash.
@@ -137,10 +137,10 @@ class LearnedMind:
 
 
 class LearnedInterfering(Interfering):
-    """An NPC of a grade, with a mind that ``garl train`` wrote."""
+    """An NPC of a grade, that decides by weights of ``garl train``."""
 
     def __init__(self, weights: str, sha256: str, grade: str) -> None:
-        super().__init__(grade, LearnedMind(weights, sha256))
+        super().__init__(grade, LearnedRule(weights, sha256))
 
 
 def learned_director(weights: Path = DIRECTOR, sha256: str = "") -> LearnedDirector:

@@ -18,6 +18,7 @@ import numpy as np
 from pytest_garl.airframe import Airframe
 from pytest_garl.flight.flight import Flight, Track
 from pytest_garl.flight.thresholds import feet_height_m
+from pytest_garl.npcs.decision_rules import Intercepting
 from pytest_garl.npcs.director import GRADES, NEAR_M, TimeToGo
 from pytest_garl.npcs.encounter import (
     COLLISION_WORTH,
@@ -29,7 +30,6 @@ from pytest_garl.npcs.encounter import (
 from pytest_garl.npcs.gradient import Stopping
 from pytest_garl.npcs.interference import Interfering
 from pytest_garl.npcs.learned import Array
-from pytest_garl.npcs.minds import Intercepting
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.scenario import Scenario

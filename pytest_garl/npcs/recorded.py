@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pytest_garl.errors import PolicyError
-from pytest_garl.npcs.way_out import WayOut
+from pytest_garl.npcs.exit_path import ExitPath
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, STAY, Move, PolicySpec, Situation
 
 Moves = Mapping[str, Sequence[tuple[float, float]]]
@@ -44,14 +44,14 @@ class Recorded:
         self._moves = enumerate(self._all[name])
         self._own = self._changes.get(name, [])
         self._last: tuple[float, float] = (0.0, 0.0)
-        self._exit: WayOut | None = None
+        self._exit: ExitPath | None = None
 
     def decide(self, situation: Situation) -> Move:
         """Repeat the next move."""
         number, move = next(self._moves, (-1, None))
         if move is None and self._exit is None:
             # Wait one decision: the flight of a shortened record may last a moment longer.
-            self._exit = WayOut(situation, self._last)
+            self._exit = ExitPath(situation, self._last)
             return STAY
         if move is None:
             assert self._exit is not None

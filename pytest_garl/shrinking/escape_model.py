@@ -158,7 +158,7 @@ class EscapeModel:
             tick = number * step
             index = int(np.searchsorted(chase.flight.uav.time_s, tick * TICK_S - 1e-6))
             index = min(index, len(chase.flight.uav.time_s) - 1)
-            self._take_in(npcs, index)
+            self._follow(npcs, index)
             self._place(npcs, index)
             motion = self._motion(index)
             scenario = environment_at(chase.scenario, chase.flight, tick * TICK_S - 1e-6)
@@ -170,15 +170,15 @@ class EscapeModel:
                     rng = generator(chase.scenario.seed, "objects", numbers[npc.name])
                     npc.policy.reset(situation, rng)
                 npc.decide(situation)
-        self._take_in(npcs, self._index)
+        self._follow(npcs, self._index)
         self._place(npcs, self._index)
         for npc, item in zip(npcs, chase.flight.objects, strict=True):
             speeds = np.hypot(*item.track.velocity_mps[: self._index, :2].T)
             npc.spend_reserve(speeds.tolist(), TICKS_PER_SAMPLE * TICK_S)
         return npcs
 
-    def _take_in(self, npcs: Sequence[Npc], index: int) -> None:
-        """Take in the flight up to a sample of its track."""
+    def _follow(self, npcs: Sequence[Npc], index: int) -> None:
+        """Follow the flight up to a sample of its track."""
         track = self._chase.flight.uav
         known = self._known_samples
         for each in range(known, index + 1):

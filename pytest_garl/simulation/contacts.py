@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from pytest_garl.flight.flight import Outcome, Touchdown
-from pytest_garl.simulation.ground_stays import GroundStays
+from pytest_garl.simulation.ground_periods import GroundPeriods
 from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.vehicle import Quaternion, Vector
 from pytest_garl.simulation.physics.world import HullContact, World
@@ -32,7 +32,7 @@ class Contacts:
         recorder: Recorder,
         npcs: Sequence[Npc],
         hull_m: float,
-        stays: GroundStays,
+        stays: GroundPeriods,
     ) -> None:
         self._world, self._recorder, self._npcs = world, recorder, npcs
         self._hull_m, self._stays = hull_m, stays

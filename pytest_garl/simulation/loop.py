@@ -23,7 +23,7 @@ from pytest_garl.scenarios.task import HOLD_S
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.contacts import Contacts
 from pytest_garl.simulation.environment import changed
-from pytest_garl.simulation.ground_stays import GroundStays
+from pytest_garl.simulation.ground_periods import GroundPeriods
 from pytest_garl.simulation.landing_place import what_lies_under
 from pytest_garl.simulation.navigation import Navigation
 from pytest_garl.simulation.npc_policy import (
@@ -99,7 +99,7 @@ class Loop:
         self.recorder = Recorder(placed, self.npcs)
         self.moments = self.recorder.moments
         self._strikes = Strikes(scenario, self.moments, events)
-        stays = GroundStays(self.recorder, self._model, placed.marker_m, self._under)
+        stays = GroundPeriods(self.recorder, self._model, placed.marker_m, self._under)
         self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m, stays)
         self._control = FlightControl(self._model)
         self._wind = Wind(scenario, map.ground.texture)
@@ -309,7 +309,7 @@ class Loop:
             self._system.truth_pilot.observe_truth(self._truth(self._navigation.error_m))
         command = self._system.step(delivery.observation)
         error_m = estimation_error_m(delivery.observation, delivery.place_m)
-        self.recorder.step(command, delivery.sight, error_m, delivery.range_m)
+        self.recorder.step(command, delivery.content, error_m, delivery.range_m)
         latency_s = self._system.airframe.latency_s
         self._pending.append((tick + round(latency_s * PHYSICS_RATE_HZ), command))
 

@@ -39,7 +39,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sight:
+class FrameContent:
     """What a frame shows: the fields of ``Step`` of the same names."""
 
     marker_visible: float = 0.0
@@ -131,12 +131,12 @@ class Recorder:
         event = Event(time_s=self.time_s if time_s is None else time_s, name=name, text=text)
         bisect.insort(self._events, event, key=lambda each: each.time_s)
 
-    def sight(self, frame: Frame, renderer: Renderer, eye: Vector) -> Sight:
+    def content_of(self, frame: Frame, renderer: Renderer, eye: Vector) -> FrameContent:
         """Return what a frame shows of the marker and of the objects."""
         ids = renderer.segment_ids
         area = frame.marker_area_px
         names = [item.name for item in self._objects if frame.pixels[ids[item.name]]]
-        return Sight(
+        return FrameContent(
             marker_visible=min(1.0, float(frame.pixels[ids["marker"]]) / area)
             if area >= 1
             else 0.0,
@@ -149,7 +149,7 @@ class Recorder:
     def step(
         self,
         command: Command,
-        sight: Sight,
+        content: FrameContent,
         error_m: Vector = (0.0, 0.0, 0.0),
         range_m: float | None = None,
     ) -> None:
@@ -158,7 +158,7 @@ class Recorder:
         ``error_m`` is the error of the position that the system got, ``range_m`` the reading
         of its rangefinder.
         """
-        self.moments.see(self.time_s, sight.marker)
+        self.moments.see(self.time_s, content.marker)
         diagnostics = command.diagnostics
         if diagnostics and diagnostics.phase != self._phase:
             self._phase = diagnostics.phase
@@ -167,12 +167,12 @@ class Recorder:
             Step(
                 time_s=self.time_s,
                 command=type(command).__name__,
-                marker_visible=sight.marker_visible,
-                marker_px=sight.marker_px,
-                objects_visible=sight.objects_visible,
+                marker_visible=content.marker_visible,
+                marker_px=content.marker_px,
+                objects_visible=content.objects_visible,
                 diagnostics=diagnostics,
-                marker=sight.marker,
-                objects_px=sight.objects_px,
+                marker=content.marker,
+                objects_px=content.objects_px,
                 estimation_error_m=error_m,
                 rangefinder_m=range_m,
             )

@@ -23,7 +23,7 @@ from pytest_garl.simulation.physics.vehicle import Motion, Vector
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.rangefinder import Ranging
-from pytest_garl.simulation.recorder import Recorder, Sight
+from pytest_garl.simulation.recorder import FrameContent, Recorder
 from pytest_garl.simulation.system_under_test.observation import observe
 from pytest_garl.simulation.timing import Timing
 
@@ -32,12 +32,12 @@ from pytest_garl.simulation.timing import Timing
 class Delivery:
     """An observation as it reaches the landing system.
 
-    ``sight`` is what the picture shows, and ``place_m`` is where the UAV was at that moment.
+    ``content`` is what the picture shows, and ``place_m`` is where the UAV was at that moment.
     ``range_m`` is the rangefinder's reading; the observation notes whether somebody reads it.
     """
 
     observation: Observation
-    sight: Sight
+    content: FrameContent
     place_m: Vector
     range_m: float | None
 
@@ -45,7 +45,7 @@ class Delivery:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Picture:
     frame: Frame
-    sight: Sight
+    content: FrameContent
     place_m: Vector
     tick: int
     jitter_ms: float
@@ -73,7 +73,7 @@ class Sensors:
         self._renderer: Renderer | None = None
         self._depth: DepthSensor | None = None
         self._ticks_per_frame = max(1, round(PHYSICS_RATE_HZ / camera.rate_hz))
-        self._last_look: tuple[Frame, Sight] | None = None
+        self._last_look: tuple[Frame, FrameContent] | None = None
         self._pictures: deque[_Picture] = deque()
         self._poses: deque[Motion] = deque(maxlen=1 + max(0, -self._timing.stamp_ticks))
         self._under_way: deque[tuple[int, Delivery]] = deque()
@@ -94,10 +94,10 @@ class Sensors:
         """Whether the camera takes a picture at a step of the physics."""
         return tick % self._ticks_per_frame == 0
 
-    def look(self, tick: int, motion: Motion) -> tuple[Frame, Sight]:
+    def look(self, tick: int, motion: Motion) -> tuple[Frame, FrameContent]:
         """Return the camera's picture at this moment, and what it shows."""
         now = tick / PHYSICS_RATE_HZ
-        black = blank_frame(self._camera.height_px, self._camera.width_px), Sight()
+        black = blank_frame(self._camera.height_px, self._camera.width_px), FrameContent()
         if self._renderer is None or self._depth is None:
             return black
         if self._outage.happens(now):
@@ -111,10 +111,10 @@ class Sensors:
         )
         frame = self._renderer.render(eye, attitude, now, poses, movement)
         frame.measured_depth_m = self._depth.measured(frame.depth_m, now)
-        sight = self._recorder.sight(frame, self._renderer, eye)
+        content = self._recorder.content_of(frame, self._renderer, eye)
         if self._freezes:
-            self._last_look = frame, sight
-        return frame, sight
+            self._last_look = frame, content
+        return frame, content
 
     def deliveries(self, tick: int, motion: Motion, estimate: Motion) -> Iterator[Delivery]:
         """Yield what reaches the landing system at this step of the physics, in order.
@@ -137,10 +137,10 @@ class Sensors:
         jitter_ms = self._timing.jitter_ms()
         if jitter_ms is None:
             return
-        frame, sight = self.look(tick, motion)
+        frame, content = self.look(tick, motion)
         picture = _Picture(
             frame=frame,
-            sight=sight,
+            content=content,
             place_m=motion.position_m,
             tick=tick,
             jitter_ms=jitter_ms,
@@ -162,7 +162,7 @@ class Sensors:
         )
         delivery = Delivery(
             observation=observation,
-            sight=picture.sight,
+            content=picture.content,
             place_m=picture.place_m,
             range_m=picture.range_m,
         )

@@ -11,6 +11,7 @@ import pytest
 
 from pytest_garl import Airframe
 from pytest_garl.flight.flight import Track
+from pytest_garl.npcs.decision_rules import Intercepting
 from pytest_garl.npcs.encounter import (
     Encounter,
     Passage,
@@ -20,7 +21,6 @@ from pytest_garl.npcs.encounter import (
     in_picture,
 )
 from pytest_garl.npcs.interference import Interfering
-from pytest_garl.npcs.minds import Intercepting
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
+from pytest_garl.npcs.decision_rules import Direct
 from pytest_garl.npcs.grades import GRADE_LIMITS
 from pytest_garl.npcs.interference import Belief, Interfering, Perception, Sighting, kept_away
-from pytest_garl.npcs.minds import Direct
 from pytest_garl.scenarios.bodies import discs_of
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.simulation.npc_policy import STAY, Move

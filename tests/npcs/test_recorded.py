@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pytest_garl.errors import PolicyError
+from pytest_garl.npcs.exit_path import LANDING_ZONE_M
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.npcs.recorded import handed_over_spec, recorded_spec
-from pytest_garl.npcs.way_out import LANDING_ZONE_M
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
@@ -100,7 +100,7 @@ def test_an_npc_leaves_past_trees_and_the_edge_of_the_map(
     assert away(walked((heading,), start, marker=marker)[-1], marker) >= LANDING_ZONE_M - 0.5
 
 
-def test_the_way_out_repeats() -> None:
+def test_the_exit_path_repeats() -> None:
     assert walked(((0.6, 0.8),), (-1.0, 0.0)) == walked(((0.6, 0.8),), (-1.0, 0.0))
 
 

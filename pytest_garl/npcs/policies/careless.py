@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from pytest_garl.npcs.exit_path import STUCK, ExitPath
 from pytest_garl.npcs.interference import LEAVES_TO_M, drawn_story
-from pytest_garl.npcs.way_out import STUCK, WayOut
 from pytest_garl.scenarios.story import story_of
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, STAY, Move, Situation
 
@@ -27,11 +27,11 @@ class Careless:
         told = story_of(situation.scenario, situation.self.name)
         self._story = told or drawn_story(self.grade, rng)
         self._crossed_s = math.inf
-        self._move, self._way_out = STAY, None
+        self._move, self._exit = STAY, None
         self._place, self._waited = (math.inf, math.inf), 0
 
     _move: Move
-    _way_out: WayOut | None
+    _exit: ExitPath | None
     _place: tuple[float, float]
 
     def decide(self, situation: Situation) -> Move:
@@ -39,8 +39,8 @@ class Careless:
         now, story = situation.time_s, self._story
         if now < story.begins_s(situation.moments_s):
             return STAY
-        if self._way_out is not None:
-            return self._way_out.decide(situation)
+        if self._exit is not None:
+            return self._exit.decide(situation)
         (mx, my), (dx, dy) = situation.marker_position_m, story.crossing_m
         x, y, _ = situation.self.position_m
         ahead_x, ahead_y = mx + dx - x, my + dy - y
@@ -56,8 +56,8 @@ class Careless:
         if self._waited == 2:
             self._crossed_s = -math.inf
         if now >= self._crossed_s + (story.pause_s if stands else 0.0):
-            self._way_out = WayOut(situation, (self._move.x, self._move.y), LEAVES_TO_M)
-            return self._way_out.decide(situation)
+            self._exit = ExitPath(situation, (self._move.x, self._move.y), LEAVES_TO_M)
+            return self._exit.decide(situation)
         if reached and stands:
             return STAY
         if distance > 0:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.flight.flight import Flight
+from pytest_garl.npcs.decision_rules import Intercepting
 from pytest_garl.npcs.director import FEATURES, Watch
 from pytest_garl.npcs.encounter import (
     AFTERMATH_STEPS,
@@ -32,7 +33,6 @@ from pytest_garl.npcs.encounter import (
     in_picture,
 )
 from pytest_garl.npcs.interference import Interference, Interfering
-from pytest_garl.npcs.minds import Intercepting
 from pytest_garl.npcs.training.graded_landing import GradedLanding, draw_graded_landing
 from pytest_garl.npcs.training.presets import Surrogate
 from pytest_garl.npcs.training.uav_models import MOST_CAUTIOUS_M
@@ -186,7 +186,7 @@ def _fly(
     landing: GradedLanding, on_decision: Callable[[Situation], None] = lambda situation: None
 ) -> tuple[Flight, tuple[float, ...]]:
     """Fly a landing; show each decision's situation; return the record and when phases began."""
-    episode, mind, left = landing.begin(), Intercepting(), AFTERMATH_STEPS
+    episode, rule, left = landing.begin(), Intercepting(), AFTERMATH_STEPS
     try:
         situation = episode.situations[0]
         # The story says everything: nothing is drawn.
@@ -195,7 +195,7 @@ def _fly(
             on_decision(situation)
             belief = part.look(situation)
             if belief is not None:
-                part.answer(mind.decide(belief))
+                part.answer(rule.decide(belief))
             left -= part.is_over
             if left < 0:
                 break

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("gymnasium")
 from gymnasium.utils.env_checker import check_env
 
-from pytest_garl.npcs.minds import Intercepting
+from pytest_garl.npcs.decision_rules import Intercepting
 from pytest_garl.npcs.training.episode import draw_episode
 from pytest_garl.npcs.training.graded_landing import LATEST_COMING_S, with_story
 from pytest_garl.npcs.training.presets import PRESETS

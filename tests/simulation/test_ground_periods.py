@@ -24,7 +24,7 @@ from pytest_garl.flight.flight import Flight, Outcome, Touchdown
 from pytest_garl.flight.thresholds import GRAVITY_MPS2
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.ground_stays import GroundStays
+from pytest_garl.simulation.ground_periods import GroundPeriods
 from pytest_garl.simulation.physics.vehicle import REFERENCE_MASS_KG, vehicle_model
 from pytest_garl.simulation.recorder import Recorder
 from tests.support.engines import engine
@@ -269,12 +269,12 @@ def test_contact_while_the_uav_slides_changes_nothing(engine: str) -> None:
     assert flight.contacts[-1].body == tree.name
 
 
-class TestGroundStays:
+class TestGroundPeriods:
     """The stays by themselves, step by step."""
 
     def setup_method(self) -> None:
         self.recorder = Recorder(Placed(nominal(), EMPTY), ())
-        self.stays = GroundStays(
+        self.stays = GroundPeriods(
             self.recorder, vehicle_model(Airframe()), (0.0, 0.0), lambda place: "nothing"
         )
         self.time_s = 0.0

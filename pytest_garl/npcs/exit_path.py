@@ -15,8 +15,8 @@ _TURN_RAD = math.radians(70)
 """Not a divisor of a full turn, so that each attempt has another direction."""
 
 
-class WayOut:
-    """The way out of a zone around the marker: straight on, or away from it if the NPC stood.
+class ExitPath:
+    """The path out of a zone around the marker: straight on, or away from it if the NPC stood.
 
     An NPC that is blocked turns, first away from the marker, then further from there.  ``last`` is
     its last move.

@@ -24,7 +24,7 @@ WATCHED_S = 2.0
 so the record shows whether the UAV still moves."""
 
 
-class GroundStays:
+class GroundPeriods:
     """Follows the stays of the UAV on the ground; ``touchdowns`` has one per stay, in order.
 
     ``was_pushed`` is whether a moving body touched the UAV after its motors had stopped: how it

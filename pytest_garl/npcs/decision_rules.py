@@ -1,4 +1,4 @@
-"""Unlearned minds of NPCs that perceive the UAV in part: rivals of the learned ones."""
+"""Rules by which NPCs that perceive the UAV in part decide: rivals of the learned ones."""
 
 from __future__ import annotations
 
