@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from lab import failure_probability as study
 from lab.failure_probability import ARMS, Flights, estimate, fly, pools, row_of
+from lab.stand_in import stand_in
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.use_file import read_use
 
 
@@ -65,3 +69,32 @@ def test_the_project_that_is_flown_goes_on_where_it_was_interrupted(
     fly(folder, 30, 1, 2, plain=False)
     assert "--garl-resume" in commands[1]
     assert "--garl-population=30" not in commands[1]
+
+
+def test_searches_draw_from_the_flights_of_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(4)
+    drawn = [
+        decode(row, study.GENOME, map="lawn", seed=7) for row in study.example_model().rows(60, rng)
+    ]
+    flights = [
+        SimpleNamespace(
+            scenario=dump_scenario(each),
+            result=stand_in(each, study.MAP, study.LANDINGS["ordinary"]),
+        )
+        for each in drawn
+    ]
+
+    class Stored:
+        def __init__(self, path: Path) -> None:
+            assert path == Path("truth/.garl/ledger.sqlite")
+            self.queries = SimpleNamespace(flights=lambda: flights)
+
+        def close(self) -> None:
+            pass
+
+    monkeypatch.setattr(study, "Ledger", Stored)
+    monkeypatch.setattr(study, "MEASURED", 50)
+    rows = list(study.resample(Path("truth"), 3))
+    failing = sum(each.result.verdict.violation for each in flights)
+    assert [row["arm"] for row in rows] == ["direct", "use", "placebo"]
+    assert {row["truth"] for row in rows} == {f"{failing / 60:.4f}"}
