@@ -97,7 +97,8 @@ class KindRecord:
     first slot with it.  ``in_control`` is the number of random flights that show it, of
     ``random_flights``; None without a control arm to compare with.  ``repeat`` is the command that
     repeats the first flight, called beside the ledger.  ``saved`` are the saved cases that end as
-    it does.  ``case`` is the shrunk case that tells its cause, None if nobody knows the cause.
+    it does.  ``case`` is the shrunk case that tells its cause, None if nobody knows the cause, and
+    ``told_by`` its name if it was shrunk from a flight that is none of these.
     """
 
     signature: str
@@ -110,6 +111,7 @@ class KindRecord:
     repeat: str = ""
     saved: tuple[SavedCase, ...] = ()
     case: Case | None = None
+    told_by: str = ""
 
     @property
     def count(self) -> int:
@@ -154,7 +156,8 @@ class KindRecord:
         It may be empty.
         """
         if self.case is not None:
-            return f"at the least: {self.case.severity.text}"
+            source = f", by {self.told_by}" if self.told_by else ""
+            return f"at the least{source}: {self.case.severity.text}"
         if self.severity is None or not self.severity.about:
             return ""
         return f"unusual in {self.severest}: {self.severity.unusual or 'nothing'}"
@@ -206,7 +209,11 @@ class KindRecord:
         if len(telling) > 1:
             order = {seed: number for number, seed in reversed([*enumerate(seeds)])}
             telling.sort(key=lambda case: _order_of(case, order.get(case.scenario.seed)))
-        return dataclasses.replace(self, saved=mine, case=next(iter(telling), None))
+        case = next(iter(telling), None)
+        others_name = ""
+        if flights and case is not None and case.scenario.seed not in seeds:
+            others_name = next((each.name for each in mine if each.case == case), "")
+        return dataclasses.replace(self, saved=mine, case=case, told_by=others_name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -67,7 +67,7 @@ def _kind_lines(kind: KindRecord) -> list[str]:
     title, *ending = [text for text in (kind.title, kind.headline) if text] or [""]
     least = ""
     if kind.case is not None and kind.case.severity.text:
-        least = f"at the least: {kind.case.severity.text}"
+        least = kind.least
     elif kind.case is None and kind.severity is not None and kind.severity.unusual:
         least = f"unusual in the mildest of them: {kind.severity.unusual}"
     texts = (*ending, least, kind.seen_in_control, kind.repeat)

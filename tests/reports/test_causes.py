@@ -184,6 +184,8 @@ def test_a_case_of_another_search_tells_no_cause_that_no_flight_has(
     flown = dataclasses.replace(record(kind("II:never-seen", 1)), flights=(ledger_flight(1, own),))
     saved = [SavedCase(path=Path("a.toml"), case=fog, known=True)]
     assert flown.with_cases(saved).kinds[0].case == (fog if told else None)
+    (shown,) = flown.with_cases(saved).kinds
+    assert shown.least.startswith(f"at the least, by {saved[0].name}: " if told else "unusual in ")
 
 
 def ledger_flight(number: int, case: Case) -> LedgerFlight:
