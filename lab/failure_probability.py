@@ -97,8 +97,8 @@ TABLE = ResultTable(
 )
 FLOWN_TABLE = ResultTable(
     file=Path("docs/results/failure-probability-flown.csv"),
-    columns=("what", "flights", "failing", "share", "low", "high", "words"),
-    key=("what",),
+    columns=("folder", "what", "flights", "failing", "share", "low", "high", "words"),
+    key=("folder", "what"),
 )
 
 
@@ -371,7 +371,7 @@ def _flown_row(
 ) -> Mapping[str, Any]:
     values = [f"{each:.4f}" for each in (share, low, high)]
     cells = (what, flights, failing, *values, words)
-    return dict(zip(FLOWN_TABLE.columns, cells, strict=True))
+    return dict(zip(FLOWN_TABLE.columns[1:], cells, strict=True))
 
 
 def _ledger(folder: Path) -> Path:
@@ -417,7 +417,8 @@ def main() -> None:
     elif named.command == "resample":
         TABLE.append(resample(named.truth, named.searches))
     else:
-        FLOWN_TABLE.append(compare(named.truth, named.estimate))
+        rows = compare(named.truth, named.estimate)
+        FLOWN_TABLE.append({"folder": named.estimate.name, **row} for row in rows)
 
 
 if __name__ == "__main__":
