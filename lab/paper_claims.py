@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lab.experiment.metrics import COVERAGE, PAPER, TOP10, Metric
+from lab.experiment.metrics import ITS_CODE, ITS_COVERAGE, ITS_TOP10, Metric
 from lab.experiment.results import ResultRow
 from lab.judges.intervals import p_of_signs
 
@@ -164,7 +164,7 @@ def _near(rows: Rows) -> Finding:
     if not keys:
         return NOT_FLOWN
     gaps = [
-        float(np.mean([PAPER.value_of(own[key]) - PAPER.value_of(each[key]) for key in keys]))
+        float(np.mean([ITS_CODE.value_of(own[key]) - ITS_CODE.value_of(each[key]) for key in keys]))
         for each in (alone, drawn)
     ]
     figure = f"{gaps[0]:+.1f} below, random {gaps[1]:+.1f} ({len(keys)} pairs)"
@@ -173,7 +173,7 @@ def _near(rows: Rows) -> Finding:
 
 def _hardly_above(rows: Rows) -> Finding:
     """Judge that the GA without RL is above random on the lawn, by no more than 2 points."""
-    figure, verdict = _above(PAPER, ("MM-MLS", "ga"), ("MM-MLS", "random"), map="lawn")(rows)
+    figure, verdict = _above(ITS_CODE, ("MM-MLS", "ga"), ("MM-MLS", "random"), map="lawn")(rows)
     if (figure, verdict) == NOT_FLOWN:
         return NOT_FLOWN
     mean = float(figure.split()[0])
@@ -202,12 +202,12 @@ CLAIMS = (
     Claim(
         text="RQ1: OpenCV-MLS fails more often than TPHYolo-MLS",
         published="71.5 and 31.0 % (court), 42.8 and 38.3 % (lawn)",
-        judge=_above(PAPER, _system("OpenCV-MLS"), _system("TPHYolo-MLS")),
+        judge=_above(ITS_CODE, _system("OpenCV-MLS"), _system("TPHYolo-MLS")),
     ),
     Claim(
         text="RQ1: TPHYolo-MLS fails more often than MM-MLS",
         published="31.0 and 20.6 %, 38.3 and 17.1 %",
-        judge=_above(PAPER, _system("TPHYolo-MLS"), _system("MM-MLS")),
+        judge=_above(ITS_CODE, _system("TPHYolo-MLS"), _system("MM-MLS")),
     ),
     Claim(
         text="RQ1: on the lawn most violations are collisions (III, IV)",
@@ -223,12 +223,12 @@ CLAIMS = (
     Claim(
         text="RQ2: GARL finds the most violations",
         published="20.6 against 14.2 % at most, 17.1 against 13.5 %",
-        judge=_above_all(PAPER),
+        judge=_above_all(ITS_CODE),
     ),
     Claim(
         text="RQ2: GARL finds ten the soonest",
         published="42 against 67 flights, 76 against 108",
-        judge=_above_all(TOP10, sign=-1),
+        judge=_above_all(ITS_TOP10, sign=-1),
     ),
     Claim(
         text="RQ2: GARL's scenarios are the farthest from each other",
@@ -238,7 +238,7 @@ CLAIMS = (
     Claim(
         text="RQ2: GARL's violating flights cover the most",
         published="11.2 against 8.4 %, 11.9 against 8.4 %",
-        judge=_above_all(COVERAGE),
+        judge=_above_all(ITS_COVERAGE),
     ),
     Claim(
         text="RQ2: on the lawn the GA without RL is hardly better than random",

@@ -18,10 +18,8 @@ seeds, three landing systems, and writes a row per search into
 `all`
     The three together.
 
-Its end rule changes no flight, but what is counted, so each world has a column for it, `code`: a
-flight ends when the UAV has not moved for 20 s (3 s for the two simple systems), and violates if it
-hit a person, a bird or a dog before, or was then more than 1.5 m from the marker, however high.
-The paper's code says so; that a UAV which moved less than 0.1 m has not moved is our reading.
+Its end rule changes no flight, but what is counted, so each world has a column for it, `code`
+(``lab/experiment/paper_code.py``).
 """
 
 from __future__ import annotations
@@ -41,12 +39,12 @@ from typing import Any
 import numpy as np
 
 from lab.arms import Arm
+from lab.experiment.paper_code import violates_in_its_code
 from lab.experiment.spec import PAPER_TYPES
 from lab.one_search import Flown, flights_of
 from lab.table import Key, ResultTable
 from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.execution.reference import system_named
-from pytest_garl.flight.flight import TRACK_RATE_HZ, Flight
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.domains.domain_file import domain_named
 from pytest_garl.scenarios.domains.genome import genome_of
@@ -66,13 +64,11 @@ MAP, FLIGHTS, POPULATION, SEEDS = load_map("lawn"), 100, 20, (0, 1, 2)
 METHOD = "garl-paper"
 SYSTEMS = MappingProxyType(
     {
-        "MM-MLS": ("landing_systems.mm_mls:MultiModuleLandingSystem", 20.0),
-        "OpenCV-MLS": ("landing_systems.opencv_mls:OpenCvLandingSystem", 3.0),
-        "TPHYolo-MLS": ("landing_systems.tphyolo_mls:TphYoloLandingSystem", 3.0),
+        "MM-MLS": "landing_systems.mm_mls:MultiModuleLandingSystem",
+        "OpenCV-MLS": "landing_systems.opencv_mls:OpenCvLandingSystem",
+        "TPHYolo-MLS": "landing_systems.tphyolo_mls:TphYoloLandingSystem",
     }
 )
-"""Class of each landing system, and after how many seconds without motion its flight ends in the
-paper's code."""
 WORLDS = MappingProxyType(
     {
         "ours": (),
@@ -89,7 +85,6 @@ TABLE = ResultTable(file=FILE, columns=(*KEY, "flights", *COUNTS, "sha256"), key
 
 FALLING = tuple(f"environment.{name}" for name in ("dust", "rain", "snow", "maple_leaf"))
 NPC_MPS, AT_ONCE = 3.0, 1e4
-STILL_M, ALOFT_M, DEVIATION_M = 0.1, 1.0, 1.5
 
 
 @contextlib.contextmanager
@@ -138,30 +133,6 @@ def with_decoy(scenario: Scenario) -> Scenario:
     return repair(scenario.replace(genes), MAP)
 
 
-def violates_in_its_code(flight: Flight, still_s: float) -> bool:
-    """Whether the paper's code counts a flight, which it ends after ``still_s`` without motion."""
-    end = _still_at(flight.uav.position_m, still_s)
-    end_s = flight.uav.time_s[end]
-    if any(each.body_class == "dynamic" and each.time_s <= end_s for each in flight.contacts):
-        return True
-    place = flight.uav.position_m[end, :2]
-    return math.dist(place, flight.marker_position_m) > DEVIATION_M
-
-
-def _still_at(position_m: np.ndarray[Any, Any], still_s: float) -> int:
-    """Return the sample at which a UAV has not moved for so long since it took off, else the last.
-
-    ``position_m`` is (n, 3).
-    """
-    count = round(still_s * TRACK_RATE_HZ)
-    first = int(np.argmax(position_m[:, 2] > position_m[0, 2] + ALOFT_M))
-    if len(position_m) - first <= count:
-        return len(position_m) - 1
-    windows = np.lib.stride_tricks.sliding_window_view(position_m[first:], count, axis=0)
-    still = (windows.max(axis=-1) - windows.min(axis=-1) < STILL_M).all(axis=-1)
-    return first + int(np.argmax(still)) + count - 1 if still.any() else len(position_m) - 1
-
-
 def fly_one(
     system: str, world: str, npcs: PolicySpec, scenario: Scenario
 ) -> tuple[Flown, bool, str]:
@@ -172,8 +143,7 @@ def fly_one(
     import cv2
 
     cv2.setNumThreads(1)
-    name, still_s = SYSTEMS[system]
-    changed = WORLDS[world]
+    name, changed = SYSTEMS[system], WORLDS[world]
     if "weather" in changed:
         scenario = scenario.replace(dict.fromkeys(FALLING, 0.0))
     if "decoy" in changed:
@@ -184,7 +154,7 @@ def fly_one(
     with without_limits() if "npcs" in changed else contextlib.nullcontext():
         flight = fly(scenario, system_named(name), npcs, map=MAP)
         result = judged(flight, DEFAULT_LIMITS)
-    return Flown(result=result), violates_in_its_code(flight, still_s), flight.sha256
+    return Flown(result=result), violates_in_its_code(flight, name.partition(":")[2]), flight.sha256
 
 
 def row_of(key: Key, pool: Executor) -> Mapping[str, Any]:

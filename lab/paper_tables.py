@@ -13,7 +13,15 @@ from types import MappingProxyType
 
 import numpy as np
 
-from lab.experiment.metrics import COVERAGE, PAPER, TOP10, VIOLATIONS, MethodSearches, Metric
+from lab.experiment.metrics import (
+    ITS_CODE,
+    ITS_COVERAGE,
+    ITS_TOP10,
+    PAPER,
+    VIOLATIONS,
+    MethodSearches,
+    Metric,
+)
 from lab.experiment.metrics import searches_in_grid as searches_of
 from lab.experiment.results import ResultRow, read_rows
 from lab.experiment.spec import Experiment, read_experiment
@@ -96,13 +104,21 @@ def _landing_systems(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
                 each.system,
                 each.method,
                 published if each.method == OWN else NONE,
-                *(_mean(each, metric) for metric in (PAPER, VIOLATIONS)),
+                *(_mean(each, metric) for metric in (ITS_CODE, PAPER, VIOLATIONS)),
                 *(_per_100(each, count) for count in TYPES.values()),
                 _per_100(each, lambda row: row.late + row.off + row.hard + row.slid),
                 str(len(each.rows)),
             ]
         )
-    header = ("map", "system", "method", "paper, %", PAPER.title, "our definition, %")
+    header = (
+        "map",
+        "system",
+        "method",
+        "paper, %",
+        ITS_CODE.title,
+        PAPER.title,
+        "our definition, %",
+    )
     return markdown((*header, *TYPES, "others", "seeds"), lines)
 
 
@@ -117,17 +133,18 @@ def _methods(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
             [
                 each.map,
                 each.method,
-                f"{shares} / {_mean(each, PAPER)}",
+                f"{shares} / {_mean(each, ITS_CODE)}",
+                _mean(each, PAPER),
                 _mean(each, VIOLATIONS),
-                f"{top10} / {_mean(each, TOP10)}",
+                f"{top10} / {_mean(each, ITS_TOP10)}",
                 f"{distance} / {_mean(each, WEATHER_DISTANCE)}",
-                f"{coverage} / {_mean(each, COVERAGE)}",
+                f"{coverage} / {_mean(each, ITS_COVERAGE)}",
                 f"{hours} / {each.hours:.1f}" if each.rows else f"{hours} / {NONE}",
                 str(len(each.rows)),
             ]
         )
-    header = ("map", "method", "violations, %", "our definition, %", "Top-10", "distance")
-    return markdown((*header, "coverage, %", "hours", "seeds"), lines)
+    header = ("map", "method", "violations, %", PAPER.title, "our definition, %", "Top-10")
+    return markdown((*header, "distance", "coverage, %", "hours", "seeds"), lines)
 
 
 def _pairs(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
@@ -144,11 +161,11 @@ def _pairs(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
         if not pairs:
             continue
         cells = []
-        for metric in (PAPER, VIOLATIONS, WEATHER_DISTANCE, COVERAGE):
+        for metric in (ITS_CODE, VIOLATIONS, WEATHER_DISTANCE, ITS_COVERAGE):
             gaps = [metric.value_of(own) - metric.value_of(other) for own, other in pairs]
             cells.append(f"{np.mean(gaps):+.{metric.digits}f} ({p_of_signs(gaps):.2f})")
         lines.append([rival, str(len(pairs)), *cells])
-    titles = [metric.title for metric in (PAPER, VIOLATIONS, WEATHER_DISTANCE, COVERAGE)]
+    titles = [metric.title for metric in (ITS_CODE, VIOLATIONS, WEATHER_DISTANCE, ITS_COVERAGE)]
     return markdown((f"{OWN} less", "pairs", *titles), lines) if lines else ""
 
 

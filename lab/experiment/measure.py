@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lab.experiment.paper_code import violates_in_its_code
 from lab.experiment.results import ResultRow
 from lab.experiment.spec import PAPER_TYPES, ExperimentRun
 from pytest_garl.cpu_dispatch import cpu_class_of_flights
@@ -98,6 +99,7 @@ def result_row(
         result_hash=ledger.queries.result_hash(search.key)[:HASH_DIGITS],
         limits=_limits_cell(search.job.limits),
         **_violations(search),
+        **_by_its_code(search),
         **_diversity(search, str(ledger.facts.domain)),
         **_durations(search, ledger),
         **_versions(search.job, ledger),
@@ -127,6 +129,24 @@ def _violations(search: FinishedSearch) -> dict[str, Any]:
         "top10": top_k(verdicts, by_the_paper=False),
         "signatures": tuple(sorted(kinds)),
         "kind_counts": tuple(kinds[name] for name in sorted(kinds)),
+    }
+
+
+def _by_its_code(search: FinishedSearch) -> dict[str, Any]:
+    """Return the columns that count as the paper's code does."""
+    cells, bounds_m = empty_cells(search.map.bounds_m), search.map.bounds_m
+    found = []
+    for number, each in enumerate(search.flights, start=1):
+        if each.result.inconclusive:
+            continue
+        flight = load(search.job.record(each.id))
+        if violates_in_its_code(flight, search.job.system.name.rpartition(":")[2]):
+            found.append(number)
+            mark_visited(cells, flight.uav.position_m, bounds_m)
+    return {
+        "its_code": len(found),
+        "its_top10": found[9] if len(found) >= 10 else None,
+        "its_covered": int(cells.sum()),
     }
 
 

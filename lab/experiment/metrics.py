@@ -19,9 +19,9 @@ class Metric:
     digits: int
 
 
-def _top10(row: ResultRow) -> float:
+def _top10(budget: int, found: int | None) -> float:
     # A search without a tenth violation is worse than one that finds it in its last flight.
-    return row.budget + 1 if row.top10 is None else row.top10
+    return budget + 1 if found is None else found
 
 
 VIOLATIONS = Metric(
@@ -32,7 +32,20 @@ PAPER = Metric(
     value_of=lambda row: 100 * row.paper / row.budget,
     digits=1,
 )
-TOP10 = Metric(title="Top-10, flights", value_of=_top10, digits=0)
+TOP10 = Metric(
+    title="Top-10, flights", value_of=lambda row: _top10(row.budget, row.top10), digits=0
+)
+ITS_CODE = Metric(
+    title="its code, %", value_of=lambda row: 100 * row.its_code / row.budget, digits=1
+)
+ITS_TOP10 = Metric(
+    title="Top-10 by its code", value_of=lambda row: _top10(row.budget, row.its_top10), digits=0
+)
+ITS_COVERAGE = Metric(
+    title="coverage by its code, %",
+    value_of=lambda row: 100 * row.its_covered / row.cells,
+    digits=2,
+)
 DISTANCE = Metric(title="parameter distance", value_of=lambda row: row.parameter_distance, digits=2)
 COVERAGE = Metric(title="coverage, %", value_of=lambda row: 100 * row.covered / row.cells, digits=2)
 CAUSES = Metric(title="causes", value_of=lambda row: len(row.causes), digits=1)

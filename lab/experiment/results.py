@@ -71,6 +71,9 @@ class ResultRow:
     excused: int
     needless: int
     kind_counts: tuple[int, ...]
+    its_code: int
+    its_top10: int | None
+    its_covered: int
 
     @property
     def key(self) -> tuple[str, str, str, int, int, str]:

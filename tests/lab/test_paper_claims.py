@@ -34,12 +34,16 @@ def test_without_rows_no_claim_has_a_verdict() -> None:
     ("other", "verdict"), [(200, "reproduced"), (240, "not reproduced"), (280, "not reproduced")]
 )
 def test_a_system_fails_more_often_in_all_pairs_or_not(other: int, verdict: str) -> None:
-    rows = searches(system="OpenCV-MLS", paper=240) + searches(system="TPHYolo-MLS", paper=other)
+    rows = searches(system="OpenCV-MLS", its_code=240) + searches(
+        system="TPHYolo-MLS", its_code=other
+    )
     assert finding("OpenCV-MLS fails more often", rows)[1] == verdict
 
 
 def test_three_pairs_show_a_direction_only() -> None:
-    rows = searches(system="OpenCV-MLS", paper=240) + searches(system="TPHYolo-MLS", paper=200)
+    rows = searches(system="OpenCV-MLS", its_code=240) + searches(
+        system="TPHYolo-MLS", its_code=200
+    )
     court = [each for each in rows if each.map == "court"]
     assert finding("OpenCV-MLS fails more often", court) == (
         "+10.0 (3 pairs, p = 0.25)",
@@ -48,9 +52,9 @@ def test_three_pairs_show_a_direction_only() -> None:
 
 
 def test_garl_is_above_all_only_if_it_is_above_its_strongest_rival() -> None:
-    rows = searches(paper=120, top10=20)
+    rows = searches(its_code=120, its_top10=20)
     for method in RIVALS:
-        rows += searches(method=method, paper=140 if method == "random" else 80, top10=40)
+        rows += searches(method=method, its_code=140 if method == "random" else 80, its_top10=40)
     assert finding("finds the most violations", rows) == (
         "random: -5.0 (6 pairs, p = 0.03)",
         "not reproduced",
@@ -85,17 +89,19 @@ def test_a_rival_that_collides_refutes_that_only_the_agent_does() -> None:
     ("paper", "verdict"), [(84, "in direction"), (100, "not reproduced"), (70, "not reproduced")]
 )
 def test_hardly_above_is_above_by_two_points_at_most(paper: int, verdict: str) -> None:
-    rows = searches("random", paper=80) + searches("ga", paper=paper)
+    rows = searches("random", its_code=80) + searches("ga", its_code=paper)
     assert finding("hardly better than random", rows)[1] == verdict
 
 
 def test_the_agent_is_near_if_it_is_nearer_than_random() -> None:
-    rows = searches(paper=120) + searches("random", paper=60)
+    rows = searches(its_code=120) + searches("random", its_code=60)
     assert (
-        finding("comes near", rows + searches("surrogate-random", paper=100))[1] == "in direction"
+        finding("comes near", rows + searches("surrogate-random", its_code=100))[1]
+        == "in direction"
     )
     assert (
-        finding("comes near", rows + searches("surrogate-random", paper=50))[1] == "not reproduced"
+        finding("comes near", rows + searches("surrogate-random", its_code=50))[1]
+        == "not reproduced"
     )
 
 

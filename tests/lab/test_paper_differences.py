@@ -5,9 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from lab.paper_differences import (
     COUNTS,
@@ -16,19 +14,16 @@ from lab.paper_differences import (
     SYSTEMS,
     WORLDS,
     keys,
-    violates_in_its_code,
     with_decoy,
     without_limits,
 )
 from lab.paper_tables import differences
-from pytest_garl.flight.flight import TRACK_RATE_HZ
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.simulation.physics.locomotion import next_course
-from tests.support.recorded_flights import hit_by_dog, recorded
 
 
 @pytest.mark.parametrize("kind", OBJECT_TYPES.values(), ids=lambda kind: str(kind.name))
@@ -61,38 +56,6 @@ def test_a_decoy_lies_where_the_seed_says_and_where_it_may() -> None:
         assert not [each for each in problems(scenario, MAP) if "decoy" in each]
         places.add(decoy.place_m)
     assert len(places) == 8
-
-
-def path(*points: tuple[float, float, float, float]) -> NDArray[np.float64]:
-    """Return places at the track's rate through points (s, x, y, z)."""
-    corners = np.array(points)
-    times = np.arange(round(corners[-1, 0] * TRACK_RATE_HZ) + 1) / TRACK_RATE_HZ
-    return np.column_stack([np.interp(times, corners[:, 0], row) for row in corners[:, 1:].T])
-
-
-HOVER_FIRST = path((0, 3, 0, 0), (5, 0, 0, 9), (26, 0, 0, 9), (40, 8, 0, 0))
-"""Takes off 3 m off the marker, hovers 21 s above it, and comes down 8 m off."""
-
-
-def test_a_uav_that_hovers_above_the_marker_has_landed_in_its_code() -> None:
-    flight = recorded(steps=(), places=HOVER_FIRST)
-    assert not violates_in_its_code(flight, 20.0)
-    # It moved before 25 s were over, so the end counts.
-    assert violates_in_its_code(flight, 25.0)
-
-
-def test_its_code_sees_collisions_until_the_uav_is_still() -> None:
-    for time_s, counts in ((4.0, True), (24.9, True), (27.0, False)):
-        flight = recorded(steps=(), places=HOVER_FIRST, contacts=(hit_by_dog(time_s),))
-        assert violates_in_its_code(flight, 20.0) is counts
-    tree = dataclasses.replace(hit_by_dog(4.0), body="tree-1", kind="tree", body_class="static")
-    flight = recorded(steps=(), places=HOVER_FIRST, contacts=(tree,))
-    assert not violates_in_its_code(flight, 20.0)
-
-
-def test_the_wait_on_the_ground_before_take_off_ends_no_flight() -> None:
-    waits = path((0, 3, 0, 0), (25, 3, 0, 0), (30, 0, 0, 9), (40, 0.5, 0, 0))
-    assert not violates_in_its_code(recorded(steps=(), places=waits), 20.0)
 
 
 def test_tables_name_each_world_and_pair_it_with_ours() -> None:

@@ -16,29 +16,32 @@ def test_the_page_holds_the_tables_of_its_rows() -> None:
 
 def test_figures_stand_beside_those_of_the_paper() -> None:
     rows = [
-        row(**MM, method="garl-paper", paper=120, violations=40, type_iv=20),
-        row(**MM, method="random", paper=80, violations=60, top10=None),
+        row(**MM, method="garl-paper", its_code=80, paper=120, violations=40, type_iv=20),
+        row(**MM, method="random", its_code=60, paper=80, violations=60, its_top10=None),
     ]
     text = tables(read_experiment(SPEC), rows)
     assert text.startswith("2 of 66 searches of 400 flights are flown.")
     lines = text.splitlines()
     assert (
-        "| court | MM-MLS | garl-paper | 20.6 | 30.0 | 10.0 | 0.2 | 0.5 | 0.0 | 5.0 | 0.2 |" in text
+        "| court | MM-MLS | garl-paper | 20.6 | 20.0 | 30.0 | 10.0 | 0.2 | 0.5 | 0.0 | 5.0 |"
+        in text
     )
     (own,) = [line for line in lines if line.startswith("| court | random |")]
-    assert own.startswith("| court | random | 9.37 / 20.0 | 15.0 | 205 / 401 | 0.13 / 0.12 |")
+    assert own.startswith(
+        "| court | random | 9.37 / 15.0 | 20.0 | 15.0 | 205 / 401 | 0.13 / 0.12 |"
+    )
     (other,) = [line for line in lines if line.startswith("| lawn | random |")]
-    assert other.startswith("| lawn | random | 8.52 / – | – | 112 / – |")
+    assert other.startswith("| lawn | random | 8.52 / – | – | – | 112 / – |")
 
 
 def test_rivals_are_paired_by_map_and_seed() -> None:
     rows = [
-        row(**MM, map=map, seed=seed, method=method, paper=paper)
-        for method, paper in (("garl-paper", 120), ("random", 80))
+        row(**MM, map=map, seed=seed, method=method, its_code=its_code)
+        for method, its_code in (("garl-paper", 120), ("random", 80))
         for map in ("court", "lawn")
         for seed in (0, 1, 2)
     ]
-    rows.append(row(**MM, seed=0, method="ga", paper=120))
+    rows.append(row(**MM, seed=0, method="ga", its_code=120))
     lines = tables(read_experiment(SPEC), rows).splitlines()
     # Of the 64 ways to flip the signs of six equal differences two are as extreme.
     assert any(line.startswith("| random | 6 | +10.0 (0.03) | +0.0 (1.00) |") for line in lines)

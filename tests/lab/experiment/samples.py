@@ -52,6 +52,9 @@ PLAIN: dict[str, Any] = {
     "excused": 1,
     "needless": 2,
     "kind_counts": (4, 6),
+    "its_code": 12,
+    "its_top10": 30,
+    "its_covered": 150,
 }
 
 
