@@ -80,7 +80,10 @@ WORLDS = MappingProxyType(
 )
 """What each world has of the paper's."""
 KEY = ("system", "world", "seed")
-COUNTS = ("paper", "ours", "code", *PAPER_TYPES, "others")
+NO_LANDING = ("blocked", "excused", "needless")
+"""Why a UAV did not land: the marker was never free for long enough, never readable for long
+enough, or neither."""
+COUNTS = ("paper", "ours", "code", *PAPER_TYPES, "others", *NO_LANDING)
 TABLE = ResultTable(file=FILE, columns=(*KEY, "flights", *COUNTS, "sha256"), key=KEY)
 
 FALLING = tuple(f"environment.{name}" for name in ("dust", "rain", "snow", "maple_leaf"))
@@ -181,6 +184,7 @@ def row_of(key: Key, pool: Executor) -> Mapping[str, Any]:
     results = [each.result for each in flights_of(arm, plan, FLIGHTS, fly_all)]
     verdicts = [each.verdict for each in results]
     types = Counter[str](each.violation_type or "" for each in verdicts if each.violation)
+    causes = Counter[str](each.no_landing or "" for each in verdicts)
     return {
         **dict(zip(KEY, key, strict=True)),
         "flights": FLIGHTS,
@@ -189,6 +193,7 @@ def row_of(key: Key, pool: Executor) -> Mapping[str, Any]:
         "code": counted,
         **{name: types[name] for name in PAPER_TYPES},
         "others": types.total() - sum(types[name] for name in PAPER_TYPES),
+        **{name: causes[name] for name in NO_LANDING},
         "sha256": hashes.hexdigest()[:12],
     }
 

@@ -193,7 +193,9 @@ def differences(rows: Sequence[Row]) -> str:
             own = [row for row in rows if (row["system"], row["world"]) == (system, world)]
             flights = sum(int(row["flights"]) for row in own)
             cells = [
-                f"{100 * sum(int(row[name]) for row in own) / flights:.1f}" if flights else NONE
+                f"{100 * sum(int(row[name]) for row in own) / flights:.1f}"
+                if own and all(row[name] for row in own)
+                else NONE
                 for name in COUNTS
             ]
             shares.append([system, world, *cells, str(len(own))])
