@@ -1,21 +1,27 @@
 """Draw a sequence of pictures for each type of violation: ``python -m lab.violation_pictures``.
 
-Each is a saved case, flown again: what the camera saw, with what the landing system reported, as in
-the paper's figure of violations.  Two more are of MM-MLS while the UAV holds its place, as in the
-paper's figure of real flights.  They lie in ``docs/results/pictures``.
+Each is a saved case, or a scenario that was found, flown again: what the camera saw, with what the
+landing system reported, as in the paper's figure of violations.  Two more are of MM-MLS while the
+UAV holds its place, as in the paper's figure of real flights.  They lie in
+``docs/results/pictures``.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from landing_systems.mm_mls import MultiModuleLandingSystem
+from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl import cpu_dispatch
-from pytest_garl.cli.named_flight import FlightName, NamedFlight
+from pytest_garl.airframe import Camera
+from pytest_garl.cli.named_flight import FlightName
+from pytest_garl.flight.flight import Flight
+from pytest_garl.landing_system import airframe_of
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.reports.film.camera_pane import HEIGHT, WIDTH
 from pytest_garl.reports.film.drawing import Image
@@ -38,6 +44,8 @@ SEQUENCES = MappingProxyType(
     }
 )
 """The case of each sequence, and how many of its last seconds are shown."""
+FOUND = MappingProxyType({"type-III": ("found/tree.toml", OpenCvLandingSystem, 6.0)})
+"""The same of scenarios that were found and are no saved cases: file and landing system."""
 HELD = MappingProxyType({"dog": 7.6, "person": 20.0})
 """The scenarios in which the UAV holds its place, and the second that is drawn."""
 PICTURES = 5
@@ -47,18 +55,45 @@ QUALITY = 80
 """Of the JPEG files, of 100."""
 
 
-def sequence(named: NamedFlight, last_s: float) -> Image:
-    """Return ``PICTURES`` views of the camera side by side, evenly spaced over the last seconds."""
-    flight, place = named.flight, named.place
+class Scene(NamedTuple):
+    """A flight, and what draws it."""
+
+    flight: Flight
+    placed: Placed
+    camera: Camera
+    signature: str
+
+
+def of_case(case: str) -> Scene:
+    """Return the flight of a saved case."""
+    file = CASES / case
+    named = FlightName(
+        flight=str(file), ledger=None, scenario=None, system=None, folder=CASES
+    ).find(pictures=True)
+    place = named.place
     assert place is not None
     assert place.camera is not None
+    return Scene(named.flight, place.placed, place.camera, named.signature)
+
+
+def of_scenario(file: str, system: type) -> Scene:
+    """Return the flight of a landing system in a scenario of a file below ``scenarios``."""
+    scenario = load(ROOT / "scenarios" / file)
+    flight = fly(scenario, system, policy_spec("graded"))
+    limits = Limits(distance_m=default_distance_m(scenario.task.marker.side_m))
+    camera = airframe_of(system).camera
+    placed = Placed(scenario, load_map(scenario.map))
+    return Scene(flight, placed, camera, judge(flight, limits).signature)
+
+
+def sequence(scene: Scene, last_s: float) -> Image:
+    """Return ``PICTURES`` views of the camera side by side, evenly spaced over the last seconds."""
+    flight = scene.flight
     times = np.array([step.time_s for step in flight.steps])
     wanted = np.linspace(flight.elapsed_s - last_s, times[-1], PICTURES)
     chosen = {int(np.abs(times - each).argmin()) for each in wanted}
     first = min(chosen)
-    drawn = frames(
-        flight, place.placed, place.camera, named.signature, last_s=flight.elapsed_s - times[first]
-    )
+    drawn = frames(*scene, last_s=flight.elapsed_s - times[first])
     views = []
     for index, picture in enumerate(drawn, start=first):
         if index in chosen:
@@ -72,32 +107,22 @@ def sequence(named: NamedFlight, last_s: float) -> Image:
     return np.hstack(views).astype(np.uint8)
 
 
-def held(name: str, time_s: float) -> Image:
-    """Return a moment of a flight in which MM-MLS plans and the UAV holds its place."""
-    scenario = load(ROOT / "scenarios" / "held" / f"{name}.toml")
-    flight = fly(scenario, MultiModuleLandingSystem, policy_spec("graded"))
-    limits = Limits(distance_m=default_distance_m(scenario.task.marker.side_m))
-    drawn = frames(
-        flight,
-        Placed(scenario, load_map(scenario.map)),
-        MultiModuleLandingSystem.airframe.camera,
-        judge(flight, limits).signature,
-        last_s=flight.elapsed_s - time_s,
-    )
-    return np.asarray(cv2.resize(next(drawn), None, fx=0.75, fy=0.75, interpolation=cv2.INTER_AREA))
+def moment(scene: Scene, time_s: float) -> Image:
+    """Return one picture of a film."""
+    picture = next(frames(*scene, last_s=scene.flight.elapsed_s - time_s))
+    return np.asarray(cv2.resize(picture, None, fx=0.75, fy=0.75, interpolation=cv2.INTER_AREA))
 
 
 def main() -> None:
     """Fly the cases and the scenarios, and write docs/results/pictures."""
     cpu_dispatch.pin()
-    for scenario, time_s in HELD.items():
-        _write(f"held-{scenario}", held(scenario, time_s))
+    for name, time_s in HELD.items():
+        scene = of_scenario(f"held/{name}.toml", MultiModuleLandingSystem)
+        _write(f"held-{name}", moment(scene, time_s))
     for name, (case, last_s) in SEQUENCES.items():
-        file = CASES / case
-        named = FlightName(
-            flight=str(file), ledger=None, scenario=None, system=None, folder=CASES
-        ).find(pictures=True)
-        _write(name, sequence(named, last_s))
+        _write(name, sequence(of_case(case), last_s))
+    for name, (file, system, last_s) in FOUND.items():
+        _write(name, sequence(of_scenario(file, system), last_s))
 
 
 def _write(name: str, picture: Image) -> None:
