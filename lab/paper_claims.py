@@ -53,13 +53,13 @@ class Claim:
 
 
 def _of(
-    rows: Rows, system: str = "", method: str = OWN, map: str = ""
+    rows: Rows, system: str, method: str = OWN, map: str = ""
 ) -> dict[tuple[str, int], ResultRow]:
     """Return the rows of a system by a method, by map and seed."""
     return {
         (row.map, row.seed): row
         for row in rows
-        if row.method == method and system in ("", row.system) and map in ("", row.map)
+        if (row.system, row.method) == (system, method) and map in ("", row.map)
     }
 
 

@@ -96,16 +96,16 @@ def without_limits() -> Iterator[None]:
 
     A bird keeps a least speed of 0.1 m/s, because it does not fly without one.
     """
-    before = {
-        kind: {name: getattr(kind, name) for name in _limits_of(kind.flies)}
+    before = [
+        (kind, {name: getattr(kind, name) for name in _limits_of(kind.flies)})
         for kind in OBJECT_TYPES.values()
-    }
+    ]
     try:
         for kind in OBJECT_TYPES.values():
             _set(kind, _limits_of(kind.flies))
         yield
     finally:
-        for kind, values in before.items():
+        for kind, values in before:
             _set(kind, values)
 
 

@@ -20,15 +20,15 @@ from lab.paper_differences import (
 from lab.paper_tables import differences
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.object_types import OBJECT_TYPES, ObjectType
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.simulation.physics.locomotion import next_course
 
 
 @pytest.mark.parametrize("kind", OBJECT_TYPES.values(), ids=lambda kind: str(kind.name))
-def test_npcs_without_limits_turn_and_stop_at_once(kind: object) -> None:
-    before = dataclasses.asdict(kind)  # type: ignore[call-overload]
+def test_npcs_without_limits_turn_and_stop_at_once(kind: ObjectType) -> None:
+    before = dataclasses.asdict(kind)
     with without_limits():
         body = OBJECT_TYPES[before["name"]]
         assert body.speed_mps(1.0) == 3.0
@@ -36,7 +36,7 @@ def test_npcs_without_limits_turn_and_stop_at_once(kind: object) -> None:
         assert math.cos(course) == pytest.approx(-1.0)
         _, faster = next_course(body, (-speed, 0.0), math.pi, (-3.0, 0.0), 1 / 240, body.flies)
         assert faster == pytest.approx(3.0)
-    assert dataclasses.asdict(kind) == before  # type: ignore[call-overload]
+    assert dataclasses.asdict(kind) == before
 
 
 def test_limits_come_back_after_an_error() -> None:
