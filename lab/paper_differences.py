@@ -83,7 +83,8 @@ KEY = ("system", "world", "seed")
 NO_LANDING = ("blocked", "excused", "needless")
 """Why a UAV did not land: the marker was never free for long enough, never readable for long
 enough, or neither."""
-COUNTS = ("paper", "ours", "code", *PAPER_TYPES, "others", *NO_LANDING)
+KINDS = (*PAPER_TYPES, "others")
+COUNTS = ("paper", "ours", "code", *KINDS, *NO_LANDING)
 TABLE = ResultTable(file=FILE, columns=(*KEY, "flights", *COUNTS, "sha256"), key=KEY)
 
 FALLING = tuple(f"environment.{name}" for name in ("dust", "rain", "snow", "maple_leaf"))

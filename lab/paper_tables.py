@@ -28,7 +28,7 @@ from lab.experiment.spec import Experiment, read_experiment
 from lab.experiment.tables import NONE, markdown
 from lab.judges.intervals import p_of_signs
 from lab.paper_claims import OWN, WEATHER_DISTANCE, claim_lines
-from lab.paper_differences import COUNTS, SEEDS, SYSTEMS, TABLE, WORLDS
+from lab.paper_differences import COUNTS, KINDS, SEEDS, SYSTEMS, TABLE, WORLDS
 from lab.table import Row
 
 ROOT = Path(__file__).parents[1]
@@ -188,6 +188,8 @@ def differences(rows: Sequence[Row]) -> str:
     """Return the tables of the worlds between the paper's and ours, in Markdown."""
     count = len(WORLDS) * len(SYSTEMS) * len(SEEDS)
     shares, pairs = [], []
+    never = [name for name in KINDS if not any(int(row[name] or 0) for row in rows)]
+    shown = [name for name in COUNTS if name not in never]
     for system in SYSTEMS:
         for world in WORLDS:
             own = [row for row in rows if (row["system"], row["world"]) == (system, world)]
@@ -196,7 +198,7 @@ def differences(rows: Sequence[Row]) -> str:
                 f"{100 * sum(int(row[name]) for row in own) / flights:.1f}"
                 if own and all(row[name] for row in own)
                 else NONE
-                for name in COUNTS
+                for name in shown
             ]
             shares.append([system, world, *cells, str(len(own))])
     found = {(row["system"], row["seed"], row["world"]): row for row in rows}
@@ -215,9 +217,10 @@ def differences(rows: Sequence[Row]) -> str:
             pairs.append(
                 [world, str(len(keys)), *(f"{np.mean(g):+.1f} ({p_of_signs(g):.3f})" for g in gaps)]
             )
-    header = ("paper's definition, %", "our definition, %", "its code, %", *COUNTS[3:])
+    header = ("paper's definition, %", "our definition, %", "its code, %", *shown[3:])
+    none = f" No violation is of these types: {', '.join(never)}." if never else ""
     parts = [
-        f"{len(rows)} of {count} searches of 100 flights are flown.",
+        f"{len(rows)} of {count} searches of 100 flights are flown.{none}",
         markdown(("system", "world", *header, "seeds"), shares),
         markdown(("world less ours", "pairs", *header[:3]), pairs) if pairs else "",
     ]

@@ -69,6 +69,8 @@ def _command(run: ExperimentRun, folder: Path, workers: int) -> list[str]:
         "garl_probes=never",
         run.tests,
     ]
+    if run.population:
+        words.append(f"--garl-population={run.population}")
     if run.npcs:
         words.append(f"--garl-npcs={run.npcs}")
     return [*words, "--garl-resume"] if _has_ledger(folder / "ledger.sqlite") else words

@@ -22,8 +22,13 @@ WITH = " with "
 PAPER = "paper"
 """The domain of experiments that name none: the world of the paper."""
 PAPER_TYPES = ("I", "II", "III", "IV", "V")
+_MOST_SCENARIOS = 1000
+"""Largest population."""
 TOP_KEYS = frozenset(
-    {"title", "text", "report", "budget", "domain", "seeds", "maps", "systems", "grids"}
+    {
+        *("title", "text", "report", "budget", "population", "domain", "seeds", "maps", "systems"),
+        "grids",
+    }
 )
 
 
@@ -33,7 +38,8 @@ class ExperimentRun:
 
     ``system`` is the name in tables and rows, ``tests`` the argument of pytest.  ``method`` is a
     search method, or "method with policy" if another NPC policy replaces the method's own.
-    ``domain`` is a name or a TOML file, as ``--garl-domain`` takes it.
+    ``domain`` is a name or a TOML file, as ``--garl-domain`` takes it.  ``population`` is the
+    number of scenarios in a generation, 0 for pytest's own.
     """
 
     system: str
@@ -43,6 +49,7 @@ class ExperimentRun:
     method: str
     seed: int
     budget: int
+    population: int = 0
 
     @property
     def search_method(self) -> str:
@@ -67,7 +74,9 @@ class ExperimentRun:
     def folder(self) -> str:
         """The name of the folder of its ledger; different runs have different names."""
         words = (self.system, self.method, f"seed{self.seed}", str(self.budget), *self.maps)
-        digest = hashlib.sha256(repr((self.tests, self.domain, *words)).encode()).hexdigest()[:6]
+        digest = hashlib.sha256(
+            repr((self.tests, self.domain, self.population, *words)).encode()
+        ).hexdigest()[:6]
         return re.sub(r"[^A-Za-z0-9]+", "-", "-".join((*words, digest)))
 
 
@@ -99,6 +108,7 @@ class Experiment:
     title: str
     text: str
     budget: int
+    population: int
     systems: Mapping[str, str]
     grids: tuple[Grid, ...]
 
@@ -122,6 +132,7 @@ class Experiment:
                 method=method,
                 seed=seed,
                 budget=self.budget,
+                population=self.population,
             )
             for (domain, system, method, seed), maps in found.items()
         )
@@ -151,6 +162,7 @@ def read_experiment(file: Path) -> Experiment:
         title=top.string("title"),
         text=top.string("text", "").strip(),
         budget=top.integer("budget", low=1, high=_MOST_FLIGHTS),
+        population=top.integer("population", 0, low=0, high=_MOST_SCENARIOS),
         systems=names,
         grids=grids,
     )
