@@ -135,6 +135,23 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     assert row.package_sha256 == ledger.facts.package_sha256
 
 
+def test_a_shorter_search_of_equal_population_is_the_beginning_of_a_longer_one(
+    project: Path,
+) -> None:
+    flown = []
+    for budget in (12, 8):
+        change(project, "budget = 12", f"budget = {budget}\npopulation = 4")
+        result = garl("--workers=2", f"--out=out-{budget}")
+        assert result.exit_code == 0, result.output
+        run, _ = read_experiment(Path("toy.toml")).runs
+        ledger = Ledger(project / ".garl" / "experiments" / run.folder / "ledger.sqlite")
+        search, _ = next(each for each in ledger.searches() if '"map": "lawn"' in each[1])
+        flown.append([each.scenario for each in ledger.queries.flights(search)])
+    longer, shorter = flown
+    assert len(longer) == 12
+    assert shorter == longer[:8]
+
+
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
