@@ -6,8 +6,6 @@ flies the paper's search on the map ``lawn`` in each world of :data:`WORLDS`, 10
 seeds, three landing systems, and writes a row per search into
 ``docs/results/experiments/paper-differences.csv``; rows that are there are not flown again.
 
-`ours`
-    The domain `paper` as it ships.
 `npcs`
     NPCs as in the paper's code: all go at 3 m/s, and turn, start and stop at once.
 `decoy`
@@ -18,8 +16,11 @@ seeds, three landing systems, and writes a row per search into
 `all`
     The three together.
 
-Its end rule changes no flight, but what is counted, so each world has a column for it, `code`
-(``lab/experiment/paper_code.py``).
+The domain `paper` as it ships, `ours`, is not among them: its rows are those of the paper's
+experiment (``lab/experiment``), whose searches of the same method have the same flights.
+
+The paper's end rule changes no flight, but what is counted, so each world has a column for it,
+`code` (``lab/experiment/paper_code.py``).
 """
 
 from __future__ import annotations
@@ -71,7 +72,6 @@ SYSTEMS = MappingProxyType(
 )
 WORLDS = MappingProxyType(
     {
-        "ours": (),
         "npcs": ("npcs",),
         "decoy": ("decoy",),
         "weather": ("weather",),
@@ -79,6 +79,7 @@ WORLDS = MappingProxyType(
     }
 )
 """What each world has of the paper's."""
+OURS = "ours"
 KEY = ("system", "world", "seed")
 NO_LANDING = ("blocked", "excused", "needless")
 """Why a UAV did not land: the marker was never free for long enough, never readable for long

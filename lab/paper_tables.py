@@ -28,7 +28,18 @@ from lab.experiment.spec import Experiment, read_experiment
 from lab.experiment.tables import NONE, markdown
 from lab.judges.intervals import p_of_signs
 from lab.paper_claims import OWN, WEATHER_DISTANCE, claim_lines
-from lab.paper_differences import COUNTS, KINDS, SEEDS, SYSTEMS, TABLE, WORLDS
+from lab.paper_differences import (
+    COUNTS,
+    FLIGHTS,
+    KINDS,
+    MAP,
+    NO_LANDING,
+    OURS,
+    SEEDS,
+    SYSTEMS,
+    TABLE,
+    WORLDS,
+)
 from lab.table import Row
 
 ROOT = Path(__file__).parents[1]
@@ -94,8 +105,11 @@ def tables(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
 
 
 def _landing_systems(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
-    """Return the table of RQ1: how often, and how, the landing systems fail."""
-    lines = []
+    """Return the table of RQ1: how often, and how, the landing systems fail.
+
+    Types of which there is no violation have no column.
+    """
+    lines, seen = [], [count for count in TYPES.values() if any(count(row) for row in rows)]
     for each in searches_of(experiment, experiment.grids[0], rows):
         published = f"{PUBLISHED_SHARES[each.system, each.map]:.1f}"
         lines.append(
@@ -105,8 +119,8 @@ def _landing_systems(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
                 each.method,
                 published if each.method == OWN else NONE,
                 *(_mean(each, metric) for metric in (ITS_CODE, PAPER, VIOLATIONS)),
-                *(_per_100(each, count) for count in TYPES.values()),
-                _per_100(each, lambda row: row.late + row.off + row.hard + row.slid),
+                *(_per_100(each, count) for count in seen),
+                _per_100(each, _others),
                 str(len(each.rows)),
             ]
         )
@@ -119,7 +133,8 @@ def _landing_systems(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
         PAPER.title,
         "our definition, %",
     )
-    return markdown((*header, *TYPES, "others", "seeds"), lines)
+    names = (name for name, count in TYPES.items() if count in seen)
+    return markdown((*header, *names, "others", "seeds"), lines)
 
 
 def _methods(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
@@ -184,14 +199,35 @@ def claims(rows: Sequence[ResultRow]) -> str:
     return markdown(("claim", "paper", "here", "verdict"), claim_lines(rows)) + "\n"
 
 
-def differences(rows: Sequence[Row]) -> str:
+def in_our_world(rows: Sequence[ResultRow]) -> list[Row]:
+    """Return the experiment's searches that those of the other worlds are compared with."""
+    return [
+        {
+            **{"system": row.system, "world": OURS, "seed": str(row.seed)},
+            **{"flights": str(row.budget), "paper": str(row.paper), "ours": str(row.violations)},
+            "code": str(row.its_code),
+            **{name: str(count(row)) for name, count in TYPES.items()},
+            "others": str(_others(row)),
+            **{name: str(getattr(row, name)) for name in NO_LANDING},
+        }
+        for row in rows
+        if (row.method, row.map, row.budget) == (OWN, MAP.name, FLIGHTS)
+    ]
+
+
+def _others(row: ResultRow) -> int:
+    return row.late + row.off + row.hard + row.slid
+
+
+def differences(flown: Sequence[Row], ours: Sequence[Row]) -> str:
     """Return the tables of the worlds between the paper's and ours, in Markdown."""
-    count = len(WORLDS) * len(SYSTEMS) * len(SEEDS)
+    rows, worlds = (*ours, *flown), (OURS, *WORLDS)
+    count = len(worlds) * len(SYSTEMS) * len(SEEDS)
     shares, pairs = [], []
     never = [name for name in KINDS if not any(int(row[name] or 0) for row in rows)]
     shown = [name for name in COUNTS if name not in never]
     for system in SYSTEMS:
-        for world in WORLDS:
+        for world in worlds:
             own = [row for row in rows if (row["system"], row["world"]) == (system, world)]
             flights = sum(int(row["flights"]) for row in own)
             cells = [
@@ -207,10 +243,10 @@ def differences(rows: Sequence[Row]) -> str:
             (system, str(seed))
             for system in SYSTEMS
             for seed in SEEDS
-            if (system, str(seed), world) in found and (system, str(seed), "ours") in found
+            if (system, str(seed), world) in found and (system, str(seed), OURS) in found
         ]
-        if world != "ours" and keys:
-            lines = [(found[*key, world], found[*key, "ours"]) for key in keys]
+        if keys:
+            lines = [(found[*key, world], found[*key, OURS]) for key in keys]
             gaps = (
                 [int(own[name]) - int(other[name]) for own, other in lines] for name in COUNTS[:3]
             )
@@ -220,7 +256,7 @@ def differences(rows: Sequence[Row]) -> str:
     header = ("paper's definition, %", "our definition, %", "its code, %", *shown[3:])
     none = f" No violation is of these types: {', '.join(never)}." if never else ""
     parts = [
-        f"{len(rows)} of {count} searches of 100 flights are flown.{none}",
+        f"{len(rows)} of {count} searches of {FLIGHTS} flights are flown.{none}",
         markdown(("system", "world", *header, "seeds"), shares),
         markdown(("world less ours", "pairs", *header[:3]), pairs) if pairs else "",
     ]
@@ -233,7 +269,7 @@ def with_tables(page: str) -> str:
     rows = read_rows(experiment.rows)
     page = _with(page, "tables", tables(experiment, rows))
     page = _with(page, "claims", claims(rows))
-    return _with(page, "differences", differences(TABLE.rows()))
+    return _with(page, "differences", differences(TABLE.rows(), in_our_world(rows)))
 
 
 def _with(page: str, name: str, text: str) -> str:

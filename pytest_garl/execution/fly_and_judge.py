@@ -184,7 +184,7 @@ def _of_held(evidence: Evidence, result: FlightResult) -> FlightResult:
     if result.outcome == "crashed":
         return result
     held, primary = Held(evidence), result.verdict.primary
-    if not held.reports_anything:
+    if held.could_report and not held.reports_anything:
         return dataclasses.replace(result, outcome="inconclusive", undecided=NOTHING_REPORTED)
     off_m = held.off_marker_m
     if off_m is not None and primary != "distance":

@@ -45,6 +45,8 @@ BACK_AFTER_S = 3.0
 """ArduPilot's AC_PrecLand loses a landing target after 2 s, PX4 (PLD_BTOUT) after 5 s."""
 BESIDE_M = 4.0
 """How far from the marker a flight starts or arrives: the default camera sees it from 10 m."""
+SEEN_FROM = 0.4
+"""The same as a share of the height, for a UAV that holds its place."""
 WIND_MPS = 5.0
 """Half of what the Matrice 100 resists by its data sheet."""
 AIRS = ((0.75, 0.0), (1.0, 0.0), (1.0, 0.5), (1.0, 1.0))
@@ -131,10 +133,12 @@ def start_beside(clear: Scenario, map: Map, domain: Domain) -> Probe:
 def _away_m(scenario: Scenario, domain: Domain) -> float:
     """Return how far from the marker a flight starts or arrives.
 
-    In a domain of surveyed pads that is at most the error of the mission's coordinate there.
+    In a domain of surveyed pads that is at most the error of the mission's coordinate there.  A UAV
+    that holds its place is not farther away than its camera sees.
     """
-    _, farthest = domain.range_of("told.error_m") or (0.0, 0.0)
-    return min(BESIDE_M, farthest) if scenario["told.surveyed"] >= 0.5 else BESIDE_M
+    start, (_, farthest) = scenario.task.start, domain.range_of("told.error_m") or (0.0, 0.0)
+    away_m = min(BESIDE_M, SEEN_FROM * start.height_m) if start.holds else BESIDE_M
+    return min(away_m, farthest) if scenario["told.surveyed"] >= 0.5 else away_m
 
 
 def probes_for(
@@ -355,9 +359,11 @@ def _half_way(twin: Flight) -> tuple[float, float] | None:
 def _half_height(twin: Flight) -> tuple[float, float]:
     """Return when a flight that landed came down through half of its height, and how high it was.
 
-    The height is that of the feet, as in all texts.
+    The height is that of the feet, as in all texts.  A flight that held its place has no such
+    moment: half of its time counts.
     """
+    times_s, heights_m = twin.uav.time_s, twin.uav.position_m[:, 2]
     half = _top_m(twin) / 2
-    above = np.nonzero(twin.uav.position_m[:, 2] > half)[0]
-    height = feet_height_m(float(twin.uav.position_m[above[-1], 2]))
-    return round(float(twin.uav.time_s[above[-1]]), 2), height
+    passed = times_s < times_s[-1] / 2 if twin.outcome == "held" else heights_m > half
+    last = np.nonzero(passed)[0][-1]
+    return round(float(times_s[last]), 2), feet_height_m(float(heights_m[last]))

@@ -44,7 +44,8 @@ NO_TARGET = "the UAV held its place, and the marker was never the system's targe
 NO_PLAN = "the UAV held its place, and the system reported no planned path"
 NOTHING_REPORTED = (
     "the UAV held its place, and the system reported nothing that can be judged: return commands "
-    "with Diagnostics(planned_path_m=..., target_m=..., detections=...)"
+    "with Diagnostics(planned_path_m=..., target_m=..., detections=...); a program that speaks "
+    "MAVLink sends LANDING_TARGET"
 )
 """Why properties of such a flight are not decided."""
 
@@ -84,6 +85,23 @@ class Held:
     def reports_anything(self) -> bool:
         """Whether there is anything to judge: a plan, a target or a detection."""
         return self.reports_plans or self.evidence.reports_anything
+
+    @property
+    def could_report(self) -> bool:
+        """Whether the marker could be read for so long that who sees it reports it.
+
+        A system that looks at no picture could report at any time.
+        """
+        read = self.evidence.flight.data_read
+        if read is not None and "image" not in read:
+            return True
+        return first_span(self.plans.times_s, self._readable, UNDETECTED_S) is not None
+
+    @cached_property
+    def _readable(self) -> NDArray[np.bool_]:
+        """Whether the marker could be read in each frame."""
+        times = {each.time_s for each in self.evidence.readable_until(self.evidence.gave_up_s)}
+        return np.array([each.step.time_s in times for each in self._reports], np.bool_)
 
     @cached_property
     def off_marker_m(self) -> float | None:
@@ -201,13 +219,9 @@ class Held:
         evidence = self.evidence
         longest_s, began_s = evidence.undetected
         if not evidence.reports_detections:
-            readable = {step.time_s for step in evidence.readable_until(evidence.gave_up_s)}
-            missed = [
-                each.step.time_s in readable and each.target_m is None for each in self._reports
-            ]
-            judged = self.reports_anything
-            span = first_span(self.plans.times_s, np.array(missed, np.bool_), UNDETECTED_S)
-            if span and judged:
+            silent = np.array([each.target_m is None for each in self._reports], np.bool_)
+            span = first_span(self.plans.times_s, self._readable & silent, UNDETECTED_S)
+            if span and self.reports_anything:
                 began_s, longest_s = span[0], span[1] - span[0]
         if longest_s < UNDETECTED_S:
             return
@@ -301,7 +315,8 @@ class Held:
         if hit := self.evidence.hit:
             return f"{hit.body} met the UAV, which held its place."
         if not self.reports_anything:
-            return "Held its place; the system reported no plan, no target and no detection."
+            why = "" if self.could_report else ", and the marker could not be read for long enough"
+            return f"Held its place; the system reported no plan, no target and no detection{why}."
         gap = self._gap(clear=False)
         if gap:
             since_s, until_s = gap

@@ -17,13 +17,14 @@ from lab.paper_differences import (
     with_decoy,
     without_limits,
 )
-from lab.paper_tables import differences
+from lab.paper_tables import differences, in_our_world
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.object_types import OBJECT_TYPES, ObjectType
 from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.simulation.physics.locomotion import next_course
+from tests.lab.experiment.samples import row
 
 
 @pytest.mark.parametrize("kind", OBJECT_TYPES.values(), ids=lambda kind: str(kind.name))
@@ -63,11 +64,18 @@ def test_tables_name_each_world_and_pair_it_with_ours() -> None:
     rows = [
         dict(zip(("system", "world", "seed"), key, strict=True))
         | {"flights": "100", "sha256": ""}
-        | dict.fromkeys(COUNTS, "30" if key[1] == "npcs" else "20")
+        | dict.fromkeys(COUNTS, "30")
         for key in keys(["MM-MLS"])
-        if key[1] in ("ours", "npcs")
+        if key[1] == "npcs"
     ]
-    text = differences(rows)
+    counts = {"paper": 20, "violations": 20, "its_code": 20}
+    searches = [
+        row(system="MM-MLS", map=map, method="garl-paper", seed=seed, budget=budget, **counts)
+        for map, budget in (("lawn", 100), ("lawn", 400), ("court", 100))
+        for seed in SEEDS
+    ]
+    text = differences(rows, in_our_world(searches))
+    assert "| MM-MLS | ours | 20.0 | 20.0 | 20.0 |" in text
     assert text.startswith("6 of 45 searches of 100 flights are flown.")
     assert "| MM-MLS | npcs | 30.0 | 30.0 | 30.0 |" in text
     assert "| OpenCV-MLS | all | – | – | – |" in text

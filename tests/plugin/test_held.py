@@ -33,6 +33,12 @@ class Aims(Base):
 class Silent(Base):
     def step(self, observation): return Land()
 
+class Watches(Base):
+    needs_camera = True
+    def step(self, observation):
+        assert observation.image is not None
+        return Land()
+
 class Raises(Base):
     def step(self, observation): raise RuntimeError("the terminal point is in an obstacle")
 '''
@@ -64,7 +70,7 @@ seed = 1
 [scenario.marker]
 x_m = {x_m}
 y_m = 0.0
-{npc}
+{more}
 [task.marker]
 dictionary = "DICT_5X5_50"
 id = 3
@@ -82,12 +88,20 @@ grade = "careless"
 """
 
 
+COVERED = """
+[scenario.cover]
+from_s = 0.0
+lasts_s = 60.0
+share_percent = 100.0
+"""
+
+
 def flown(
-    pytester: pytest.Pytester, system: str, npc: str = "", x_m: float = 0.0
+    pytester: pytest.Pytester, system: str, more: str = "", x_m: float = 0.0
 ) -> pytest.RunResult:
     """Return a run whose tests fly one scenario."""
     pytester.makepyfile(systems=SYSTEMS, test_it=TESTS.format(system=system))
-    (pytester.path / "one.toml").write_text(SCENARIO.format(x_m=x_m, npc=npc))
+    (pytester.path / "one.toml").write_text(SCENARIO.format(x_m=x_m, more=more))
     return run(pytester, "--garl-repeat=one.toml", "-v", "-p", "no:randomly")
 
 
@@ -116,6 +130,12 @@ def test_a_system_that_reports_nothing_is_not_green(pytester: pytest.Pytester) -
     assert "passed" not in result.parseoutcomes()
 
 
+def test_a_system_is_silent_while_the_marker_cannot_be_read(pytester: pytest.Pytester) -> None:
+    result = flown(pytester, "Watches", COVERED)
+    result.stdout.fnmatch_lines(["*test_distance*SKIPPED (not judged: the UAV*"])
+    assert "inconclusive" not in result.stdout.str()
+
+
 def test_a_planner_that_raises_fails(pytester: pytest.Pytester) -> None:
     result = flown(pytester, "Raises")
     assert result.parseoutcomes()["failed"] == 1
@@ -127,3 +147,20 @@ def test_a_search_tells_that_its_flights_held_their_place(pytester: pytest.Pytes
     result = run(pytester, "--garl-budget=2", "--garl-population=2", "-o", "garl_domain=calm")
     result.stdout.fnmatch_lines(["*held its place in 2 flights: no landing, its plans are judged*"])
     assert "landed in none" not in result.stdout.str()
+
+
+def test_a_search_of_silent_flights_says_what_to_report(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(systems=SYSTEMS, test_it=TESTS.format(system="Silent"))
+    result = run(pytester, "--garl-budget=2", "--garl-population=2", "-o", "garl_domain=calm")
+    text = " ".join(result.stdout.str().split())
+    assert "at most 0 may be: lawn-g00-s00, lawn-g00-s01. The UAV held its place" in text
+    assert "sends LANDING_TARGET" in text
+    assert "--garl-timeout" not in text
+
+
+def test_probes_hide_the_marker_half_way_through_the_hold(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(systems=SYSTEMS, test_it=TESTS.format(system="Looks"))
+    words = "--garl-budget=2", "--garl-population=2", "-o", "garl_probes=always", "-rA"
+    text = run(pytester, *words, "-o", "garl_domain=calm").stdout.str()
+    assert "from 15.0 s on, 4.8 m up, the marker is gone for a minute" in text
+    assert "the marker lies 2 m west of the start" in text

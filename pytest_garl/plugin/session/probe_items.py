@@ -190,7 +190,8 @@ class _Flown:
         first, second = self._fly([clear, beside.scenario])
         if not _has_landed(first):
             story = headline(first.result.verdict.story)
-            self.problem = f"no probes: it does not land in clear air: {story}"
+            what = "has no plan for the marker" if target.task.start.holds else "does not land"
+            self.problem = f"no probes: it {what} in clear air: {story}"
             return
         base, twin = (second, beside.scenario) if _has_landed(second) else (first, clear)
         camera = (target.airframe or Airframe()).camera

@@ -6,6 +6,7 @@ No other module sets ``session.exitstatus``; a session that cannot go on ends by
 from __future__ import annotations
 
 import traceback
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -170,19 +171,35 @@ def _inconclusive(searches: Sequence[SearchRecord]) -> Iterator[str]:
         if len(slots) > allowed:
             yield (
                 f"{search.name}: {len(slots)} of {flown} flights are inconclusive, "
-                f"at most {allowed} may be: {listed(slots)}. Fly them while the machine has "
-                "nothing else to do, or allow more time with --garl-timeout"
+                f"at most {allowed} may be: {listed(slots)}. {_why_inconclusive(search)}"
             )
+
+
+def _why_inconclusive(search: SearchRecord) -> str:
+    """Return why flights are inconclusive if they came to an end, else what helps."""
+    results = [each.result for each in search.flights if each.result.inconclusive]
+    reasons = Counter(each.undecided for each in results if each.crash is None)
+    if reasons:
+        ((reason, _),) = reasons.most_common(1)
+        return f"{reason[:1].upper()}{reason[1:]}"
+    return (
+        "Fly them while the machine has nothing else to do, or allow more time with --garl-timeout"
+    )
 
 
 def _without_landing(searches: Sequence[SearchRecord]) -> Iterator[str]:
     """Yield in which searches no flight landed within the limits, whatever is known of them."""
     for search in searches:
-        if not search.completed_well:
-            yield (
-                f"{search.name}: landed within the limits in none of "
-                f"{counted(search.flown, 'flight')}, so nothing shows that it can land"
-            )
+        if search.completed_well:
+            continue
+        flown = counted(search.flown, "flight")
+        yield (
+            f"{search.name}: held its place, and had the marker as its target in none of {flown} "
+            "without a violation"
+            if search.held
+            else f"{search.name}: landed within the limits in none of {flown}, so nothing shows "
+            "that it can land"
+        )
 
 
 def _unrepeated(tally: Tally, searches: Sequence[SearchRecord]) -> Iterator[str]:
