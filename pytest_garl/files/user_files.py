@@ -268,9 +268,9 @@ class Table:
         return number
 
 
-def read_table(path: Path, source: str = "") -> Table:
-    """Return a TOML file as its top table; errors name ``source``, else the path."""
-    return parse_table(read_text(path), source or str(path))
+def read_table(path: Path) -> Table:
+    """Return a TOML file as its top table; errors name the path."""
+    return parse_table(read_text(path), str(path))
 
 
 def parse_table(text: str, source: str) -> Table:
