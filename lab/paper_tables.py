@@ -29,13 +29,11 @@ from lab.experiment.tables import NONE, markdown
 from lab.judges.intervals import p_of_signs
 from lab.paper_claims import OWN, WEATHER_DISTANCE, claim_lines
 from lab.paper_differences import (
-    COUNTS,
     FLIGHTS,
-    KINDS,
     MAP,
-    NO_LANDING,
     OURS,
     SEEDS,
+    SHARES,
     SYSTEMS,
     TABLE,
     WORLDS,
@@ -154,7 +152,7 @@ def _methods(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
                 f"{top10} / {_mean(each, ITS_TOP10)}",
                 f"{distance} / {_mean(each, WEATHER_DISTANCE)}",
                 f"{coverage} / {_mean(each, ITS_COVERAGE)}",
-                f"{hours} / {each.hours:.1f}" if each.rows else f"{hours} / {NONE}",
+                f"{hours} / {each.hours:.2f}" if each.rows else f"{hours} / {NONE}",
                 str(len(each.rows)),
             ]
         )
@@ -196,7 +194,7 @@ def _per_100(searches: MethodSearches, count_of: Callable[[ResultRow], int]) -> 
 
 def claims(rows: Sequence[ResultRow]) -> str:
     """Return the table of the paper's claims, in Markdown."""
-    return markdown(("claim", "paper", "here", "verdict"), claim_lines(rows)) + "\n"
+    return markdown(("claim", "here", "verdict"), claim_lines(rows)) + "\n"
 
 
 def in_our_world(rows: Sequence[ResultRow]) -> list[Row]:
@@ -206,9 +204,6 @@ def in_our_world(rows: Sequence[ResultRow]) -> list[Row]:
             **{"system": row.system, "world": OURS, "seed": str(row.seed)},
             **{"flights": str(row.budget), "paper": str(row.paper), "ours": str(row.violations)},
             "code": str(row.its_code),
-            **{name: str(count(row)) for name, count in TYPES.items()},
-            "others": str(_others(row)),
-            **{name: str(getattr(row, name)) for name in NO_LANDING},
         }
         for row in rows
         if (row.method, row.map, row.budget) == (OWN, MAP.name, FLIGHTS)
@@ -224,17 +219,13 @@ def differences(flown: Sequence[Row], ours: Sequence[Row]) -> str:
     rows, worlds = (*ours, *flown), (OURS, *WORLDS)
     count = len(worlds) * len(SYSTEMS) * len(SEEDS)
     shares, pairs = [], []
-    never = [name for name in KINDS if not any(int(row[name] or 0) for row in rows)]
-    shown = [name for name in COUNTS if name not in never]
     for system in SYSTEMS:
         for world in worlds:
             own = [row for row in rows if (row["system"], row["world"]) == (system, world)]
             flights = sum(int(row["flights"]) for row in own)
             cells = [
-                f"{100 * sum(int(row[name]) for row in own) / flights:.1f}"
-                if own and all(row[name] for row in own)
-                else NONE
-                for name in shown
+                f"{100 * sum(int(row[name]) for row in own) / flights:.1f}" if own else NONE
+                for name in SHARES
             ]
             shares.append([system, world, *cells, str(len(own))])
     found = {(row["system"], row["seed"], row["world"]): row for row in rows}
@@ -247,18 +238,15 @@ def differences(flown: Sequence[Row], ours: Sequence[Row]) -> str:
         ]
         if keys:
             lines = [(found[*key, world], found[*key, OURS]) for key in keys]
-            gaps = (
-                [int(own[name]) - int(other[name]) for own, other in lines] for name in COUNTS[:3]
-            )
+            gaps = ([int(own[name]) - int(other[name]) for own, other in lines] for name in SHARES)
             pairs.append(
                 [world, str(len(keys)), *(f"{np.mean(g):+.1f} ({p_of_signs(g):.3f})" for g in gaps)]
             )
-    header = ("paper's definition, %", "our definition, %", "its code, %", *shown[3:])
-    none = f" No violation is of these types: {', '.join(never)}." if never else ""
+    header = ("paper's definition, %", "our definition, %", "its code, %")
     parts = [
-        f"{len(rows)} of {count} searches of {FLIGHTS} flights are flown.{none}",
+        f"{len(rows)} of {count} searches of {FLIGHTS} flights are flown.",
         markdown(("system", "world", *header, "seeds"), shares),
-        markdown(("world less ours", "pairs", *header[:3]), pairs) if pairs else "",
+        markdown(("world less ours", "pairs", *header), pairs) if pairs else "",
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 

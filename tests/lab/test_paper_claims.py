@@ -27,7 +27,7 @@ def searches(method: str = "garl-paper", system: str = "MM-MLS", **values: Any) 
 
 
 def test_without_rows_no_claim_has_a_verdict() -> None:
-    assert {line[2:] for line in claim_lines([])} == {NOT_FLOWN}
+    assert {line[1:] for line in claim_lines([])} == {NOT_FLOWN}
 
 
 @pytest.mark.parametrize(
