@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from lab.detectability_conditions import CONDITIONS
 from lab.detectability_fit import auc, brier, deciles, fit
 from lab.detectability_frames import KINDS, MAPS, Detectors, Kind, ReadFrame, read_frames
-from pytest_garl import cpu_dispatch
 from pytest_garl.flight.detectability import COEFFICIENTS, Network, features
 from pytest_garl.flight.flight import MarkerView
 
@@ -116,7 +115,6 @@ def chunk(numbers: tuple[int, ...], kind: Kind) -> Array:
 
 def pinned_processes(workers: int) -> ProcessPoolExecutor:
     """Return processes that compute alike on every machine, with one thread each."""
-    cpu_dispatch.pin()
     return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
 
 

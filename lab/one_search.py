@@ -25,7 +25,6 @@ from typing import Any
 
 from lab.arms import ARMS, DOMAIN, FROZEN, Arm, arm_named
 from lab.table import ResultTable
-from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.execution.reference import system_named
@@ -212,7 +211,6 @@ def main() -> None:
     named = vars(parser.parse_args())
     table = ResultTable(file=named.pop("out"), columns=COLUMNS, key=(*COLUMNS[:4], "flight"))
     workers = named.pop("workers")
-    cpu_dispatch.pin()
     try:
         # Whoever cannot be flown is told before a process starts.
         re.compile(named["until"])

@@ -6,6 +6,7 @@ import csv
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -63,10 +64,14 @@ class ResultTable:
         row_of: Callable[[Key, Executor], Mapping[str, Any]],
         workers: int | None = None,
     ) -> None:
-        """Append a row for each key without one; ``row_of`` flies in the executor's processes."""
+        """Append a row for each key without one; ``row_of`` flies in the executor's processes.
+
+        They are new ones: a copy of this process has loaded its libraries for this CPU.
+        """
         known = self.keys()
-        cpu_dispatch.pin()
-        with ProcessPoolExecutor(workers) as pool:
+        with ProcessPoolExecutor(
+            workers, mp_context=get_context("spawn"), initializer=cpu_dispatch.check
+        ) as pool:
             for key in keys:
                 if key not in known:
                     self.append([row_of(key, pool)])

@@ -17,7 +17,6 @@ import numpy as np
 
 from landing_systems.mm_mls import MultiModuleLandingSystem
 from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl import cpu_dispatch
 from pytest_garl.airframe import Camera
 from pytest_garl.cli.named_flight import FlightName
 from pytest_garl.flight.flight import Flight
@@ -115,7 +114,6 @@ def moment(scene: Scene, time_s: float) -> Image:
 
 def main() -> None:
     """Fly the cases and the scenarios, and write docs/results/pictures."""
-    cpu_dispatch.pin()
     for name, time_s in HELD.items():
         scene = of_scenario(f"held/{name}.toml", MultiModuleLandingSystem)
         _write(f"held-{name}", moment(scene, time_s))

@@ -12,7 +12,6 @@ import dataclasses
 import numpy as np
 
 from lab.foreign.catalogue import SYSTEMS, Foreign
-from pytest_garl import cpu_dispatch
 from pytest_garl.flight.flight import Flight
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
@@ -42,7 +41,6 @@ def nominal(foreign: Foreign, map_name: str, off_m: float) -> Scenario:
 
 def main() -> None:
     """Fly and print."""
-    cpu_dispatch.pin()
     parser = argparse.ArgumentParser(description=__doc__)
     names = [each.name for each in SYSTEMS]
     parser.add_argument("--systems", nargs="+", default=names, choices=names)

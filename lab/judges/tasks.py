@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from lab.table import ResultTable
-from pytest_garl import cpu_dispatch
 from pytest_garl.execution.processes import end_with_parent
 
 FOLDER = Path(".garl/judges")
@@ -45,7 +44,6 @@ def run(tasks: Sequence[Task], folder: Path, pool_of: Callable[[], Executor]) ->
     folder.mkdir(parents=True, exist_ok=True)
     missing = [task for task in tasks if not file_of(folder, task).is_file()]
     print(f"{len(tasks) - len(missing)} of {len(tasks)} are flown, in {folder}", flush=True)
-    cpu_dispatch.pin()
     commit, began = present_commit(), time.monotonic()
     with pool_of() as pool:
         flying = {pool.submit(task.row): task for task in missing}
