@@ -84,9 +84,7 @@ KEY = ("system", "world", "seed")
 NO_LANDING = ("blocked", "excused", "needless")
 """Why a UAV did not land: the marker was never free for long enough, never readable for long
 enough, or neither."""
-SHARES = ("paper", "ours", "code")
-"""Flights that violate by the paper's definition, by ours, and as its code counts."""
-COUNTS = (*SHARES, *PAPER_TYPES, "others", *NO_LANDING)
+COUNTS = ("paper", "ours", "code", *PAPER_TYPES, "others", *NO_LANDING)
 TABLE = ResultTable(file=FILE, columns=(*KEY, "flights", *COUNTS, "sha256"), key=KEY)
 
 FALLING = tuple(f"environment.{name}" for name in ("dust", "rain", "snow", "maple_leaf"))
