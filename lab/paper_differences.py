@@ -80,6 +80,7 @@ WORLDS = MappingProxyType(
 )
 """What each world has of the paper's."""
 OURS = "ours"
+"""The world that the others are compared with."""
 KEY = ("system", "world", "seed")
 NO_LANDING = ("blocked", "excused", "needless")
 """Why a UAV did not land: the marker was never free for long enough, never readable for long

@@ -28,24 +28,16 @@ from lab.experiment.spec import Experiment, read_experiment
 from lab.experiment.tables import NONE, markdown
 from lab.judges.intervals import p_of_signs
 from lab.paper_claims import OWN, WEATHER_DISTANCE, claim_lines
-from lab.paper_differences import (
-    FLIGHTS,
-    MAP,
-    OURS,
-    SEEDS,
-    SYSTEMS,
-    TABLE,
-    WORLDS,
-)
+from lab.paper_differences import FLIGHTS, MAP, OURS, SEEDS, SYSTEMS, TABLE, WORLDS
 from lab.table import Row
 
 ROOT = Path(__file__).parents[1]
-SHARES = MappingProxyType({"ours": "our definition, %", "code": "its code, %"})
-"""What the worlds are compared by."""
 SPEC = ROOT / "docs" / "results" / "experiments" / "paper.toml"
 PAGE = ROOT / "docs" / "results" / "paper.md"
 BEGIN = "<!-- {}: python -m lab.paper_tables -->\n"
 END = "<!-- end of the {} -->\n"
+SHARES = MappingProxyType({"ours": "our definition, %", "code": "its code, %"})
+"""What the worlds are compared by: the column, and its title."""
 
 PUBLISHED_SHARES = MappingProxyType(
     {
@@ -202,8 +194,11 @@ def in_our_world(rows: Sequence[ResultRow]) -> list[Row]:
     """Return the experiment's searches that those of the other worlds are compared with."""
     return [
         {
-            **{"system": row.system, "world": OURS, "seed": str(row.seed)},
-            **{"flights": str(row.budget), "paper": str(row.paper), "ours": str(row.violations)},
+            "system": row.system,
+            "world": OURS,
+            "seed": str(row.seed),
+            "flights": str(row.budget),
+            "ours": str(row.violations),
             "code": str(row.its_code),
         }
         for row in rows

@@ -26,8 +26,8 @@ _MOST_SCENARIOS = 1000
 """Largest population."""
 TOP_KEYS = frozenset(
     {
-        *("title", "text", "report", "budget", "population", "domain", "seeds", "maps", "systems"),
-        "grids",
+        *("title", "text", "report", "budget", "population", "domain"),
+        *("seeds", "maps", "systems", "grids"),
     }
 )
 

@@ -194,7 +194,7 @@ def _without_landing(searches: Sequence[SearchRecord]) -> Iterator[str]:
             continue
         flown = counted(search.flown, "flight")
         yield (
-            f"{search.name}: held its place, and had the marker as its target in none of {flown} "
+            f"{search.name}: held its place, and in none of {flown} was the marker its target "
             "without a violation"
             if search.held
             else f"{search.name}: landed within the limits in none of {flown}, so nothing shows "
