@@ -190,8 +190,9 @@ class _Flown:
         first, second = self._fly([clear, beside.scenario])
         if not _has_landed(first):
             story = headline(first.result.verdict.story)
-            what = "has no plan for the marker" if target.task.start.holds else "does not land"
-            self.problem = f"no probes: it {what} in clear air: {story}"
+            holds = target.task.start.holds
+            what = "the marker is not its target" if holds else "it does not land"
+            self.problem = f"no probes: {what} in clear air: {story}"
             return
         base, twin = (second, beside.scenario) if _has_landed(second) else (first, clear)
         camera = (target.airframe or Airframe()).camera

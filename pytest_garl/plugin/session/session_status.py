@@ -178,7 +178,7 @@ def _inconclusive(searches: Sequence[SearchRecord]) -> Iterator[str]:
 def _why_inconclusive(search: SearchRecord) -> str:
     """Return why flights are inconclusive if they came to an end, else what helps."""
     results = [each.result for each in search.flights if each.result.inconclusive]
-    reasons = Counter(each.undecided for each in results if each.crash is None)
+    reasons = Counter(each.undecided for each in results if each.undecided and not each.crash)
     if reasons:
         ((reason, _),) = reasons.most_common(1)
         return f"{reason[:1].upper()}{reason[1:]}"
