@@ -159,7 +159,7 @@ def test_a_search_of_silent_flights_says_what_to_report(pytester: pytest.Pyteste
 
 
 def test_probes_hide_the_marker_half_way_through_the_hold(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(systems=SYSTEMS, test_it=TESTS.format(system="Looks"))
+    pytester.makepyfile(systems=SYSTEMS, test_it=TESTS.format(system="Plans"))
     words = "--garl-budget=2", "--garl-population=2", "-o", "garl_probes=always", "-rA"
     text = run(pytester, *words, "-o", "garl_domain=calm").stdout.str()
     assert "from 15.0 s on, 4.8 m up, the marker is gone for a minute" in text

@@ -140,10 +140,13 @@ def test_a_shorter_search_of_equal_population_is_the_beginning_of_a_longer_one(
 ) -> None:
     flown = []
     for budget in (12, 8):
-        change(project, "budget = 12", f"budget = {budget}\npopulation = 4")
+        change(project, 'methods = ["garl", "random"]', 'methods = ["garl"]')
+        text = (project / "toy.toml").read_text()
+        text = text.replace("budget = 12", f"budget = {budget}\npopulation = 4")
+        (project / "toy.toml").write_text(text)
         result = garl("--workers=2", f"--out=out-{budget}")
         assert result.exit_code == 0, result.output
-        run, _ = read_experiment(Path("toy.toml")).runs
+        (run,) = read_experiment(Path("toy.toml")).runs
         ledger = Ledger(project / ".garl" / "experiments" / run.folder / "ledger.sqlite")
         search, _ = next(each for each in ledger.searches() if '"map": "lawn"' in each[1])
         flown.append([each.scenario for each in ledger.queries.flights(search)])
