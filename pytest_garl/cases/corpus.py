@@ -165,23 +165,25 @@ class Corpus:
         return folder_of(self.folder, system)
 
     def _find(self, case: Case) -> CorpusEntry | None:
-        """Return the file that expects the same failure: system, map, ending, cause and test.
+        """Return the file that expects the same failure: system, map, ending, test, cause.
 
         A case that gates nothing expects no failure but its own, so that a robust one of its
         signature is saved beside it.  A second case on an edge would say nothing more.  A case of
-        a worse search is saved, because a known one does not excuse what is worse.
+        a worse search is saved, because a known one does not excuse what is worse.  One that is
+        not shrunk fails for the cause of a shrunk one if it has all of that.
         """
         for entry in self.entries(case.system):
             if entry.case is None or _failure(entry.case) != _failure(case):
+                continue
+            is_told = _is_told_by(entry.case, case)
+            if not is_told and cause_of_case(entry.case) != cause_of_case(case):
                 continue
             if entry.case.expects_signature:
                 same = not _is_worse(case, entry.case)
             else:
                 both_on_edge = case.edge and entry.case.edge and entry.case.status == "open"
-                same = both_on_edge or (
-                    _without_bound(entry.case).id == _without_bound(case).id
-                    and entry.case.reason == case.reason
-                )
+                same_flight = _without_bound(entry.case).id == _without_bound(case).id
+                same = both_on_edge or is_told or (same_flight and entry.case.reason == case.reason)
             if same:
                 return entry
         return None
@@ -292,9 +294,17 @@ def _failure(case: Case) -> tuple[object, ...]:
         case.system,
         case.scenario.map,
         case.ending,
-        cause_of_case(case),
         case.asserting_test,
         case.assertion,
+    )
+
+
+def _is_told_by(known: Case, case: Case) -> bool:
+    """Return whether a case is not shrunk and has all that an open, shrunk one takes."""
+    return (
+        (known.is_shrunk and not case.is_shrunk)
+        and (known.status, known.reason) == (case.status, case.reason)
+        and cause_of_case(known).is_in(case.scenario)
     )
 
 

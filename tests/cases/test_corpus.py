@@ -9,13 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.cases.case import NoGateReason, Status
+from pytest_garl.cases.case import Case, NoGateReason, Status
 from pytest_garl.cases.case_file import dump_case, load_case
 from pytest_garl.cases.corpus import Corpus, patch_of, read_acceptance, replace_file
 from pytest_garl.errors import CorpusError
 from pytest_garl.files import user_files
 from pytest_garl.scenarios.maps import map as package
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.scenario import Scenario
 from tests.cases.samples import OBJECT_NAMES, SYSTEM, case
 
 TEXT = dump_case(case())
@@ -111,6 +112,32 @@ def test_robust_case_is_saved_beside_one_on_an_edge_and_a_second_one_on_an_edge_
     assert corpus.save(robust) is not None
     assert [*corpus.expected_signatures(SYSTEM, "lawn")] == [robust.violation.signature]
     assert corpus.save(dataclasses.replace(robust, moves=())) is None
+
+
+@pytest.mark.parametrize("reason", ["", "sensor-limited"])
+def test_a_case_that_is_not_shrunk_is_saved_unless_it_has_all_that_a_shrunk_one_takes(
+    tmp_path: Path, reason: NoGateReason
+) -> None:
+    corpus, signature = Corpus(tmp_path), "II:never-seen"
+    nominal = dataclasses.replace(case(signature), reason=reason)
+    foggy = dataclasses.replace(nominal, scenario=in_weather({"environment.fog": 0.5}))
+    assert foggy.is_shrunk
+    path = corpus.save(foggy)
+    assert path is not None
+
+    def as_found(weather: dict[str, float]) -> Case:
+        evidence = dataclasses.replace(case().evidence, neighbours=0, neighbours_failed=0)
+        return dataclasses.replace(nominal, scenario=in_weather(weather), evidence=evidence)
+
+    assert corpus.save(as_found({"environment.fog": 0.4, "environment.dust": 0.5})) is None
+    assert corpus.save(as_found({"environment.dust": 0.5})) is not None
+    replace_file(path, dataclasses.replace(foggy, status="fixed"))
+    assert Corpus(tmp_path).save(as_found({"environment.fog": 0.4})) is not None
+
+
+def in_weather(values: dict[str, float]) -> Scenario:
+    weather = {key: 0.0 for key, _ in case().scenario.genes if key.startswith("environment.")}
+    return case().scenario.replace(weather | values)
 
 
 def test_save_sees_cases_of_other_processes(tmp_path: Path) -> None:
