@@ -113,7 +113,13 @@ def test_mm_sees_a_child_and_plans_round_it(flown: Flown) -> None:
 
 
 @pytest.mark.parametrize(
-    "system", [OpenCvLandingSystem, TphYoloLandingSystem, MultiModuleLandingSystem]
+    "system",
+    [
+        OpenCvLandingSystem,
+        # It has its detector in common with MM-MLS, and the rest with OpenCV-MLS.
+        pytest.param(TphYoloLandingSystem, marks=pytest.mark.long),
+        MultiModuleLandingSystem,
+    ],
 )
 def test_nothing_is_wrong_where_nothing_moves(system: type, flown: Flown) -> None:
     scenario = situation("dog").without("dog-1").replace({"depth.range_m": 100.0})
