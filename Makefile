@@ -54,10 +54,10 @@ layers: $(READY)
 	$(BIN)/lint-imports
 
 # The saved cases come last: the pool that flies them lives to the end, and tests of processes count children.
-# Three processes on two cores: many a test waits for a hang, for a clock or for another process.
+# Four processes on two cores: many a test waits for a hang, for a clock or for another process.
 # Cases that gate nothing are flown by `test-long`, which flies all saved cases.
 tests: $(COMPILED)
-	$(BIN)/pytest -n 3 --dist=worksteal -m "not ray and not long and not garl_gates_nothing" --durations=15 \
+	$(BIN)/pytest -n 4 --dist=worksteal -m "not ray and not long and not garl_gates_nothing" --durations=15 \
 	    tests landing_systems
 
 # PyTorch, which only training needs, is not installed there: its tests skip.
