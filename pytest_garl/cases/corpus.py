@@ -165,26 +165,9 @@ class Corpus:
         return folder_of(self.folder, system)
 
     def _find(self, case: Case) -> CorpusEntry | None:
-        """Return the file that expects the same failure: system, map, ending, test, cause.
-
-        A case that gates nothing expects no failure but its own, so that a robust one of its
-        signature is saved beside it.  A second case on an edge would say nothing more.  A case of
-        a worse search is saved, because a known one does not excuse what is worse.  One that is
-        not shrunk fails for the cause of a shrunk one if it has all of that.
-        """
+        """Return the file whose case stands for this one, too."""
         for entry in self.entries(case.system):
-            if entry.case is None or _failure(entry.case) != _failure(case):
-                continue
-            is_told = _is_told_by(entry.case, case)
-            if not is_told and cause_of_case(entry.case) != cause_of_case(case):
-                continue
-            if entry.case.expects_signature:
-                same = not _is_worse(case, entry.case)
-            else:
-                both_on_edge = case.edge and entry.case.edge and entry.case.status == "open"
-                same_flight = _without_bound(entry.case).id == _without_bound(case).id
-                same = both_on_edge or is_told or (same_flight and entry.case.reason == case.reason)
-            if same:
+            if entry.case is not None and _stands_for(entry.case, case):
                 return entry
         return None
 
@@ -288,8 +271,27 @@ def _lost(path: Path, reason: str) -> CorpusEntry:
     )
 
 
+def _stands_for(known: Case, case: Case) -> bool:
+    """Return whether a saved case is of the same failure: system, map, ending, test and cause.
+
+    A case that gates nothing expects no failure but its own, so that a robust one of its signature
+    is saved beside it.  A second case on an edge would say nothing more.  A case of a worse search
+    is saved, because a known one does not excuse what is worse.
+    """
+    if _failure(known) != _failure(case):
+        return False
+    explains = _explains(known, case)
+    if not explains and cause_of_case(known) != cause_of_case(case):
+        return False
+    if known.expects_signature:
+        return not _is_worse(case, known)
+    both_on_edge = case.edge and known.edge and known.status == "open"
+    same_flight = _without_bound(known).id == _without_bound(case).id
+    return both_on_edge or explains or (same_flight and known.reason == case.reason)
+
+
 def _failure(case: Case) -> tuple[object, ...]:
-    """Return the facts that two cases of the same failure share."""
+    """Return the facts that two cases of the same failure share, beside the cause."""
     return (
         case.system,
         case.scenario.map,
@@ -299,8 +301,8 @@ def _failure(case: Case) -> tuple[object, ...]:
     )
 
 
-def _is_told_by(known: Case, case: Case) -> bool:
-    """Return whether a case is not shrunk and has all that an open, shrunk one takes."""
+def _explains(known: Case, case: Case) -> bool:
+    """Return whether an open, shrunk case takes nothing that one which is not shrunk lacks."""
     return (
         (known.is_shrunk and not case.is_shrunk)
         and (known.status, known.reason) == (case.status, case.reason)
