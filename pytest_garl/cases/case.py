@@ -253,8 +253,10 @@ class Case:
     @property
     def shrinking(self) -> str:
         """What shrinking removed, in words, or that the case was not shrunk."""
-        is_tried = self.evidence.removed != NOTHING or not self.severity.about
-        return f"shrinking removed {self.removed}" if is_tried or self.is_shrunk else "not shrunk"
+        if self.evidence.removed != NOTHING:
+            return f"shrinking removed {self.removed}"
+        is_tried = self.is_shrunk or not self.severity.about
+        return "nothing could be left out" if is_tried else "not shrunk"
 
     @property
     def without_flights(self) -> str:
