@@ -83,5 +83,13 @@ def counts_text(counts: Mapping[Any, int]) -> str:
 
 
 def percent(count: int, total: int) -> str:
-    """Return a share in per cent, with one decimal."""
-    return f"{100 * count / total:.1f} %"
+    """Return a share in per cent, such as ``62 %``."""
+    return f"{rounded_percent(count / total, total)} %"
+
+
+def rounded_percent(share: float, total: int) -> str:
+    """Return a share of a number of things in per cent, without its sign.
+
+    One of at most a hundred is a whole per cent and more, so only of more there is a decimal.
+    """
+    return f"{100 * share:.{int(total > 100)}f}"

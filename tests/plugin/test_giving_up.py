@@ -39,8 +39,8 @@ def test_needless_giving_up_fails_one_test(
     assert result.ret == pytest.ExitCode.TESTS_FAILED
     result.stdout.fnmatch_lines(
         [
-            f"{system} on lawn: 4 flown, landed 0.0 %, violations 100.0 %*",
-            "  gave up: needless 100.0 %, excused 0.0 %, blocked 0.0 %; not landed 0.0 %",
+            f"{system} on lawn: 4 flown, landed 0 %, violations 100 %*",
+            "  gave up: needless 100 %, excused 0 %, blocked 0 %; not landed 0 %",
             "  landed 0 %: no flight landed, so nothing is known of its landings",
         ]
     )
@@ -142,9 +142,9 @@ def test_giving_up_is_allowed_by_the_limits(
     result.stdout.fnmatch_lines(
         [
             'garl: limits of HoverThenAbort: distance 0.75 m, time 120 s, abort="ok"',
-            "HoverThenAbort on lawn: 4 flown, landed 0.0 %, violations 0.0 %*",
-            "  by the paper's definition, which counts not landing: violations 100.0 %",
-            "  gave up: needless 100.0 %, *",
+            "HoverThenAbort on lawn: 4 flown, landed 0 %, violations 0 %*",
+            "  by the paper's definition, which counts not landing: violations 100 %",
+            "  gave up: needless 100 %, *",
             '  limits: distance 0.75 m, time 120 s, abort="ok"',
             "HoverThenAbort on lawn: landed within the limits in none of 4 flights, so*",
         ]
@@ -208,9 +208,9 @@ def test_giving_up_is_excused_where_nobody_can_read_the_marker(
         result.stdout.fnmatch_lines([f"test_it.py::{test}[[]lawn-g00-s00[]] {word}*"])
     result.stdout.fnmatch_lines(
         [
-            "HoverThenAbort on lawn: 4 flown, landed 0.0 %, violations 0.0 % [[]0.0, 60.2[]]",
-            "  by the paper's definition, which counts not landing: violations 100.0 %",
-            "  gave up: needless 0.0 %, excused 100.0 %, blocked 0.0 %; not landed 0.0 %",
+            "HoverThenAbort on lawn: 4 flown, landed 0 %, violations 0 % [[]0, 60[]]",
+            "  by the paper's definition, which counts not landing: violations 100 %",
+            "  gave up: needless 0 %, excused 100 %, blocked 0 %; not landed 0 %",
             "HoverThenAbort on lawn: landed within the limits in none of 4 flights, so*",
         ]
     )

@@ -64,11 +64,11 @@ def record(
 
 def test_landed_flights_come_first_and_each_reason_has_its_share() -> None:
     search = record(RESULTS, violating=2)
-    assert headline_shares(search) == "8 flown, landed 25.0 %, violations 25.0 % [3.2, 65.1]"
+    assert headline_shares(search) == "8 flown, landed 25 %, violations 25 % [3, 65]"
     assert share_lines(search) == [
-        "by the paper's definition, which counts not landing: violations 62.5 %",
-        "gave up: needless 12.5 %, excused 12.5 %, blocked 12.5 %; "
-        "not landed 12.5 % (of them blocked 1); hung 12.5 %; inconclusive 1",
+        "by the paper's definition, which counts not landing: violations 62 %",
+        "gave up: needless 12 %, excused 12 %, blocked 12 %; "
+        "not landed 12 % (of them blocked 1); hung 12 %; inconclusive 1",
         "landings: distance median 0.40 m, worst 0.60 m; time median 30.0 s, worst 40.0 s",
         "distance decided in 0 of 8 flights, time in 0",
     ]
@@ -81,7 +81,7 @@ def test_search_without_landing_says_so() -> None:
 
 def test_landings_beyond_the_limit_are_told_apart() -> None:
     off = flight_result(outcome="landed", signature="off:seen", primary="distance")
-    assert "landed 100.0 %, within the limit of distance 50.0 %" in headline_shares(
+    assert "landed 100 %, within the limit of distance 50 %" in headline_shares(
         record((RESULTS[0], off), violating=1)
     )
 

@@ -26,6 +26,7 @@ from pytest_garl.reports.run_text import (
     RepeatCommand,
     legend_of,
     percent,
+    rounded_percent,
 )
 from pytest_garl.search.method_catalogue import remembers
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
@@ -237,14 +238,14 @@ def search_table(
 
 
 def headline_shares(search: SearchRecord) -> str:
-    """Return such as ``60 flown, landed 55.0 %, violations 40.0 % [27.6, 53.5]``."""
+    """Return such as ``60 flown, landed 55 %, violations 40 % [28, 54]``."""
     total = search.flown
-    low, high = search.violating_interval
+    low, high = (rounded_percent(each, total) for each in search.violating_interval)
     shares = [f"{total} flown", f"landed {percent(search.landed, total)}"]
     if search.completed != search.landed:
         shares.append(f"within the limit of distance {percent(search.completed, total)}")
     violations = percent(search.violating, total)
-    return ", ".join([*shares, f"violations {violations} [{100 * low:.1f}, {100 * high:.1f}]"])
+    return ", ".join([*shares, f"violations {violations} [{low}, {high}]"])
 
 
 def share_lines(search: SearchRecord) -> list[str]:

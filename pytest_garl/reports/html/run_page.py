@@ -19,6 +19,7 @@ from pytest_garl.reports.run_text import (
     PAPER_DEFINITION,
     counts_text,
     percent,
+    rounded_percent,
 )
 from pytest_garl.reports.sentences import counted_causes
 from pytest_garl.verdicts.wording import limits_text
@@ -127,9 +128,9 @@ def _share(count: int, total: int) -> str:
 
 def violating_text(search: SearchRecord) -> str:
     """Return the share of flights that violate something, with its interval."""
-    low, high = search.violating_interval
+    low, high = (rounded_percent(each, search.flown) for each in search.violating_interval)
     share = percent(search.violating, search.flown)
-    return f"{share} violate something (95 %: {100 * low:.1f} to {100 * high:.1f} %)"
+    return f"{share} violate something (95 %: {low} to {high} %)"
 
 
 def figures(search: SearchRecord) -> list[Fact]:

@@ -36,7 +36,7 @@ def test_a_bar_holds_each_flight_once(tmp_path: Path) -> None:
     counts = {each.kind: each.count for each in bar}
     assert counts == {"landed": 2, "idle": 1, "II": 1, "IV": 2, "inconclusive": 1}
     assert abs(sum(each.width for each in bar) - 100) < 0.01
-    assert bar[0].text == "landed as it should: 2 (28.6 %)"
+    assert bar[0].text == "landed as it should: 2 (29 %)"
 
 
 def test_curves_rise_where_a_flight_finds_something(tmp_path: Path) -> None:
