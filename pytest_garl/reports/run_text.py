@@ -82,14 +82,6 @@ def counts_text(counts: Mapping[Any, int]) -> str:
     return ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
-def percent(count: int, total: int) -> str:
-    """Return a share in per cent, such as ``62 %``."""
-    return f"{rounded_percent(count / total, total)} %"
-
-
-def rounded_percent(share: float, total: int) -> str:
-    """Return a share of a number of things in per cent, without its sign.
-
-    One of at most a hundred is a whole per cent and more, so only of more there is a decimal.
-    """
-    return f"{100 * share:.{int(total > 100)}f}"
+def percent(count: float, total: int, sign: str = " %") -> str:
+    """Return a share in per cent: a whole number, or of more than a hundred with a decimal."""
+    return f"{100 * count / total:.{int(total > 100)}f}{sign}"

@@ -26,7 +26,6 @@ from pytest_garl.reports.run_text import (
     RepeatCommand,
     legend_of,
     percent,
-    rounded_percent,
 )
 from pytest_garl.search.method_catalogue import remembers
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
@@ -240,7 +239,7 @@ def search_table(
 def headline_shares(search: SearchRecord) -> str:
     """Return such as ``60 flown, landed 55 %, violations 40 % [28, 54]``."""
     total = search.flown
-    low, high = (rounded_percent(each, total) for each in search.violating_interval)
+    low, high = (percent(total * each, total, sign="") for each in search.violating_interval)
     shares = [f"{total} flown", f"landed {percent(search.landed, total)}"]
     if search.completed != search.landed:
         shares.append(f"within the limit of distance {percent(search.completed, total)}")

@@ -19,7 +19,6 @@ from pytest_garl.reports.run_text import (
     PAPER_DEFINITION,
     counts_text,
     percent,
-    rounded_percent,
 )
 from pytest_garl.reports.sentences import counted_causes
 from pytest_garl.verdicts.wording import limits_text
@@ -128,8 +127,9 @@ def _share(count: int, total: int) -> str:
 
 def violating_text(search: SearchRecord) -> str:
     """Return the share of flights that violate something, with its interval."""
-    low, high = (rounded_percent(each, search.flown) for each in search.violating_interval)
-    share = percent(search.violating, search.flown)
+    total = search.flown
+    share = percent(search.violating, total)
+    low, high = (percent(total * each, total, sign="") for each in search.violating_interval)
     return f"{share} violate something (95 %: {low} to {high} %)"
 
 
