@@ -168,6 +168,11 @@ class CausesTask:
         return named(arm=self.arm, system=self.system, seed=self.seed, flights=self.flights)
 
     @property
+    def group(self) -> str:
+        """Its own: it shares no flight with another search."""
+        return self.name
+
+    @property
     def map(self) -> str:
         """The map of its seed."""
         return MAPS[self.seed % len(MAPS)]

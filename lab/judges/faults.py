@@ -14,7 +14,6 @@ import numpy as np
 
 from lab.arms import arm_named
 from lab.faults.catalogue import FAULTS, PLACEBO, fault_named
-from lab.faults.control import ControlSystem
 from lab.faults.fault import Fault
 from lab.judges.flights import named
 from lab.judges.intervals import Values, mean_of, over_clusters
@@ -33,6 +32,8 @@ TWIN_SHARES = (0.98, 0.99, 1.01, 1.02)
 LEAST_FAULTY, MOST_CONTROLS = 3, 1
 """Of four twins of the faulty system so many must violate, and of those of the control at most."""
 WITHIN = (10, 25, 50, 100)
+KEPT = 128
+"""So many flights of a faulty system are kept for the next arms: all of one search, and more."""
 TABLE = ResultTable(
     file=Path("docs/results/judge-faults.csv"),
     columns=(
@@ -57,6 +58,11 @@ class FaultTask:
         """The name of its file."""
         return named(arm=self.arm, fault=self.fault, seed=self.seed, flights=self.flights)
 
+    @property
+    def group(self) -> str:
+        """The arms of a fault and seed, which fly many scenarios alike."""
+        return named(fault=self.fault, seed=self.seed, flights=self.flights)
+
     def row(self) -> dict[str, Any]:
         """Search until the first confirmed find.
 
@@ -70,7 +76,7 @@ class FaultTask:
         lost = {"found_at": None, "how": "", "signature": "", "told": "not found"}
 
         def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[Flown]:
-            return (flown_by(fault.faulty, npcs, each) for each in scenarios)
+            return (flown_once(fault.faulty, npcs, each) for each in scenarios)
 
         airframe = airframe_of(fault.faulty)
         for flight in flights_of(arm, plan, self.flights, fly_all, airframe):
@@ -103,13 +109,20 @@ def _violating(system: Any, scenario: Scenario, npcs: PolicySpec) -> int:
     return sum(violates(twin_of(system, share), npcs, scenario) for share in TWIN_SHARES)
 
 
+@functools.lru_cache(maxsize=KEPT)
+def flown_once(system: Any, npcs: PolicySpec, scenario: Scenario) -> Flown:
+    """Fly a landing system through a scenario, unless it is one of the latest flights."""
+    return flown_by(system, npcs, scenario)
+
+
+@functools.cache
 def violates(system: Any, npcs: PolicySpec, scenario: Scenario) -> bool:
     """Whether a landing system violates a property in a scenario."""
     return flown_by(system, npcs, scenario).result.verdict.violation
 
 
 @functools.cache
-def twin_of(system: type[ControlSystem], share: float) -> type[ControlSystem]:
+def twin_of(system: Any, share: float) -> Any:
     """Return the system with another speed of its approach."""
     parameters = dataclasses.replace(
         system.parameters, approach_mps=share * system.parameters.approach_mps

@@ -113,6 +113,11 @@ class PreventableTask:
         """The name of its file."""
         return named(arm=self.arm, system=self.system, map=self.map, seed=self.seed)
 
+    @property
+    def group(self) -> str:
+        """Its own: it shares no flight with another search."""
+        return self.name
+
     def row(self) -> dict[str, Any]:
         """Fly the scenarios, and make a case of each collision with the NPC."""
         with tempfile.TemporaryDirectory() as folder:

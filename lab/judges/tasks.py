@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import subprocess
@@ -27,6 +28,10 @@ class Task(Protocol):
     def name(self) -> str:
         """The name of its file, and what it is called."""
 
+    @property
+    def group(self) -> str:
+        """What it shares with the tasks beside it that one process flies, one after the other."""
+
     def row(self) -> dict[str, Any]:
         """Fly it in this process; return its row."""
 
@@ -39,28 +44,23 @@ def file_of(folder: Path, task: Task) -> Path:
 def run(tasks: Sequence[Task], folder: Path, pool_of: Callable[[], Executor]) -> int:
     """Fly the tasks that have no file, and tell after each how much time is left.
 
-    Returns how many have no file afterwards.  The pool's processes fly one task each at a time.
+    Returns how many have no file afterwards.  The pool's processes fly one group each at a time.
     """
     folder.mkdir(parents=True, exist_ok=True)
     missing = [task for task in tasks if not file_of(folder, task).is_file()]
     print(f"{len(tasks) - len(missing)} of {len(tasks)} are flown, in {folder}", flush=True)
     commit, began = present_commit(), time.monotonic()
+    groups = [[*each] for _, each in itertools.groupby(missing, key=lambda task: task.group)]
     with pool_of() as pool:
-        flying = {pool.submit(task.row): task for task in missing}
+        flying = {pool.submit(_fly, each, folder, commit): len(each) for each in groups}
+        done = 0
         try:
-            for done, future in enumerate(as_completed(flying), start=1):
-                task, error = flying[future], future.exception()
-                if error is None:
-                    row = future.result()
-                    _write(file_of(folder, task), {**row, "commit": commit})
-                    told = row["told"]
-                else:
-                    # The others are worth hours.
-                    told = "".join(traceback.format_exception(error))
+            for future in as_completed(flying):
+                done += flying[future]
                 passed_s = time.monotonic() - began
                 left_s = passed_s / done * (len(missing) - done)
                 print(
-                    f"[{done}/{len(missing)}] {task.name}: {told}; "
+                    f"[{done}/{len(missing)}] {future.result()}; "
                     f"{_hours(passed_s)} so far, about {_hours(left_s)} left",
                     flush=True,
                 )
@@ -68,6 +68,20 @@ def run(tasks: Sequence[Task], folder: Path, pool_of: Callable[[], Executor]) ->
             pool.shutdown(wait=False, cancel_futures=True)
             print("interrupted: the same command continues", flush=True)
     return sum(not file_of(folder, task).is_file() for task in tasks)
+
+
+def _fly(group: Sequence[Task], folder: Path, commit: str) -> str:
+    """Fly tasks, write the file of each, and tell how they went."""
+    told = []
+    for task in group:
+        try:
+            row = task.row()
+        except Exception:  # noqa: BLE001 (the others are worth hours)
+            told.append(f"{task.name}: {traceback.format_exc()}")
+        else:
+            _write(file_of(folder, task), {**row, "commit": commit})
+            told.append(f"{task.name}: {row['told']}")
+    return "; ".join(told)
 
 
 def nice_pool(jobs: int) -> Executor:

@@ -60,6 +60,7 @@ class Counted:
     name: str
     log: str
     fails: bool = False
+    group: str = ""
 
     def row(self) -> dict[str, Any]:
         with Path(self.log).open("a") as file:
@@ -105,6 +106,8 @@ def answering(monkeypatch: pytest.MonkeyPatch, fails: Callable[[Any, Scenario], 
         return Flown(result=bad if fails(system, scenario) else OK)
 
     monkeypatch.setattr(faults, "flown_by", flown_by)
+    faults.flown_once.cache_clear()
+    faults.violates.cache_clear()
 
 
 OK = flight_result()
@@ -151,6 +154,22 @@ def drawn(arm: str) -> list[Scenario]:
     plan = plan_of("lawn", 200, 40)
     assert plan.population == 8
     return [*arm_named(arm).make(plan).ask()]
+
+
+def test_arms_of_a_fault_fly_what_they_share_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flown: list[tuple[Any, Scenario]] = []
+
+    def fails(system: Any, scenario: Scenario) -> bool:
+        flown.append((system, scenario))
+        return scenario.seed % 5 == 1
+
+    answering(monkeypatch, fails)
+    wanted = [task(arm) for arm in ("random", "garl")]
+    assert tasks.run(wanted, tmp_path, one_thread) == 0
+    assert len(flown) == len({(str(system), scenario) for system, scenario in flown})
+    assert sum(not is_control(system) for system, _ in flown) == 2 * 40 - len(drawn("garl"))
 
 
 def test_what_the_control_fails_as_well_is_never_found(monkeypatch: pytest.MonkeyPatch) -> None:
