@@ -21,7 +21,7 @@ import numpy as np
 from lab.arms import BEFORE_MOMENTS, FROZEN, arm_named
 from lab.judges.flights import MAPS, SYSTEMS, Flights, flights_for, fly_each, named
 from lab.judges.intervals import mean_of, over_pairs, p_of_signs
-from lab.judges.tasks import FOLDER
+from lab.judges.tasks import FOLDER, Task
 from lab.one_search import flights_of, plan_of
 from lab.table import ResultTable, Row
 from pytest_garl.errors import GarlError
@@ -154,7 +154,7 @@ class Inventory:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CausesTask:
+class CausesTask(Task):
     """One search of an arm, and the causes of its violations."""
 
     arm: str
@@ -166,11 +166,6 @@ class CausesTask:
     def name(self) -> str:
         """The name of its file."""
         return named(arm=self.arm, system=self.system, seed=self.seed, flights=self.flights)
-
-    @property
-    def group(self) -> str:
-        """Its own: it shares no flight with another search."""
-        return self.name
 
     @property
     def map(self) -> str:

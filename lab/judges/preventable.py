@@ -16,6 +16,7 @@ import numpy as np
 from lab.arms import DOMAIN, arm_named
 from lab.judges.flights import MAPS, Flights, flights_for, fly_each, named
 from lab.judges.intervals import over_pairs
+from lab.judges.tasks import Task
 from lab.one_search import flights_of
 from lab.table import ResultTable, Row, share
 from pytest_garl.execution.flight_id import CompletedFlight
@@ -99,7 +100,7 @@ class GivenScenarios:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PreventableTask:
+class PreventableTask(Task):
     """The flights of an arm with one landing system on one map."""
 
     arm: str
@@ -112,11 +113,6 @@ class PreventableTask:
     def name(self) -> str:
         """The name of its file."""
         return named(arm=self.arm, system=self.system, map=self.map, seed=self.seed)
-
-    @property
-    def group(self) -> str:
-        """Its own: it shares no flight with another search."""
-        return self.name
 
     def row(self) -> dict[str, Any]:
         """Fly the scenarios, and make a case of each collision with the NPC."""

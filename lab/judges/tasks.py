@@ -30,7 +30,8 @@ class Task(Protocol):
 
     @property
     def group(self) -> str:
-        """What it shares with the tasks beside it that one process flies, one after the other."""
+        """What it shares with the tasks beside it that the same process flies: by default, none."""
+        return self.name
 
     def row(self) -> dict[str, Any]:
         """Fly it in this process; return its row."""
@@ -52,15 +53,22 @@ def run(tasks: Sequence[Task], folder: Path, pool_of: Callable[[], Executor]) ->
     commit, began = present_commit(), time.monotonic()
     groups = [[*each] for _, each in itertools.groupby(missing, key=lambda task: task.group)]
     with pool_of() as pool:
-        flying = {pool.submit(_fly, each, folder, commit): len(each) for each in groups}
+        flying = {pool.submit(_fly, each, folder, commit): each for each in groups}
         done = 0
         try:
             for future in as_completed(flying):
-                done += flying[future]
+                group, error = flying[future], future.exception()
+                # The other groups are worth hours.
+                told = (
+                    future.result()
+                    if error is None
+                    else f"{group[0].group}: {''.join(traceback.format_exception(error))}"
+                )
+                done += len(group)
                 passed_s = time.monotonic() - began
                 left_s = passed_s / done * (len(missing) - done)
                 print(
-                    f"[{done}/{len(missing)}] {future.result()}; "
+                    f"[{done}/{len(missing)}] {told}; "
                     f"{_hours(passed_s)} so far, about {_hours(left_s)} left",
                     flush=True,
                 )
@@ -71,16 +79,12 @@ def run(tasks: Sequence[Task], folder: Path, pool_of: Callable[[], Executor]) ->
 
 
 def _fly(group: Sequence[Task], folder: Path, commit: str) -> str:
-    """Fly tasks, write the file of each, and tell how they went."""
+    """Fly tasks up to one that fails, write the file of each, and tell how they went."""
     told = []
     for task in group:
-        try:
-            row = task.row()
-        except Exception:  # noqa: BLE001 (the others are worth hours)
-            told.append(f"{task.name}: {traceback.format_exc()}")
-        else:
-            _write(file_of(folder, task), {**row, "commit": commit})
-            told.append(f"{task.name}: {row['told']}")
+        row = task.row()
+        _write(file_of(folder, task), {**row, "commit": commit})
+        told.append(f"{task.name}: {row['told']}")
     return "; ".join(told)
 
 

@@ -60,7 +60,10 @@ class Counted:
     name: str
     log: str
     fails: bool = False
-    group: str = ""
+
+    @property
+    def group(self) -> str:
+        return self.name
 
     def row(self) -> dict[str, Any]:
         with Path(self.log).open("a") as file:
