@@ -16,7 +16,10 @@ MOST_NAMED = 5
 """A line names this many flights and counts the rest."""
 _NARROW = 40
 _HARD_SPACE = "\N{NO-BREAK SPACE}"
-_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|m/s|m|s)(?!\w))")
+_WITHIN_AMOUNT = re.compile(
+    r"(?<=\d) (?=(?:%|m/s|m|s)(?!\w))|(?<=%) (?=\[\d)|(?<=\d,) (?=[\d.]+\])"
+)
+"""The spaces before a unit, before an interval in per cent, and in it."""
 
 
 def width_of(config: pytest.Config) -> int:
@@ -31,7 +34,7 @@ def width_of(config: pytest.Config) -> int:
 def wrapped(text: str, width: int, *, first: str = "", others: str = "") -> str:
     """Return text in lines of at most ``width`` columns that split no word and no amount."""
     return textwrap.fill(
-        _BEFORE_UNIT.sub(_HARD_SPACE, text),
+        _WITHIN_AMOUNT.sub(_HARD_SPACE, text),
         width,
         initial_indent=first,
         subsequent_indent=others,

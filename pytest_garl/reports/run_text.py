@@ -83,5 +83,6 @@ def counts_text(counts: Mapping[Any, int]) -> str:
 
 
 def percent(count: float, total: int, sign: str = " %") -> str:
-    """Return a share in per cent: a whole number, or of more than a hundred with a decimal."""
-    return f"{100 * count / total:.{int(total > 100)}f}{sign}"
+    """Return a share in per cent: whole, but with a decimal below 0.5 or of over a hundred."""
+    share = 100 * count / total
+    return f"{share:.{int(total > 100 or 0 < share < 0.5)}f}{sign}"

@@ -74,6 +74,10 @@ def test_landed_flights_come_first_and_each_reason_has_its_share() -> None:
     ]
 
 
+def test_one_violation_in_few_flights_does_not_look_like_perhaps_none() -> None:
+    assert headline_shares(record(RESULTS, violating=1)).endswith("violations 12 % [0.3, 53]")
+
+
 def test_search_without_landing_says_so() -> None:
     lines = share_lines(record(RESULTS[2:]))
     assert "landed 0 %: no flight landed, so nothing is known of its landings" in lines
