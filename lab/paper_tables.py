@@ -112,7 +112,6 @@ def _landing_systems(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
                 *(_mean(each, metric) for metric in (ITS_CODE, PAPER, VIOLATIONS)),
                 *(_per_100(each, count) for count in seen),
                 _per_100(each, _others),
-                str(len(each.rows)),
             ]
         )
     header = (
@@ -125,7 +124,7 @@ def _landing_systems(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
         "our definition, %",
     )
     names = (name for name, count in TYPES.items() if count in seen)
-    return markdown((*header, *names, "others", "seeds"), lines)
+    return markdown((*header, *names, "others"), lines)
 
 
 def _methods(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
@@ -146,11 +145,10 @@ def _methods(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
                 f"{distance} / {_mean(each, WEATHER_DISTANCE)}",
                 f"{coverage} / {_mean(each, ITS_COVERAGE)}",
                 f"{hours} / {each.hours:.2f}" if each.rows else f"{hours} / {NONE}",
-                str(len(each.rows)),
             ]
         )
     header = ("map", "method", "violations, %", PAPER.title, "our definition, %", "Top-10")
-    return markdown((*header, "distance", "coverage, %", "hours", "seeds"), lines)
+    return markdown((*header, "distance", "coverage, %", "hours"), lines)
 
 
 def _pairs(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
