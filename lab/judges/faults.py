@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import random
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -133,14 +134,21 @@ def twin_of(system: Any, share: float) -> Any:
 def tasks(
     arms: Iterable[str], faults: Iterable[str], seeds: Iterable[int], flights: int
 ) -> list[FaultTask]:
-    """Return the searches; all arms and faults of a seed come before the next one."""
+    """Return the searches; all arms of a fault come before the next one, and all faults of a seed.
+
+    The faults of a seed are in a random order: the first of them are a random part.
+    """
     names, kinds = list(faults), list(arms)
-    return [
-        FaultTask(arm=arm, fault=fault, seed=seed, flights=flights)
-        for seed in seeds
-        for fault in names
-        for arm in kinds
-    ]
+    found = []
+    for seed in seeds:
+        order = names.copy()
+        random.Random(seed).shuffle(order)
+        found += [
+            FaultTask(arm=arm, fault=fault, seed=seed, flights=flights)
+            for fault in order
+            for arm in kinds
+        ]
+    return found
 
 
 def missed(rows: Iterable[Row], arms: Iterable[str], seeds: Iterable[int]) -> list[FaultTask]:

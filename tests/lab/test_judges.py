@@ -234,6 +234,16 @@ def test_what_not_all_arms_have_flown_does_not_count() -> None:
     assert "Left out, because not all arms have flown them: 2 searches." in text
 
 
+def test_faults_of_a_seed_are_flown_in_a_random_order() -> None:
+    first, second = (
+        [each.fault for each in faults.tasks(["garl", "random"], "abcdefgh", [seed], 100)]
+        for seed in (20, 21)
+    )
+    assert first[::2] == first[1::2]
+    assert sorted(first[::2]) == sorted(second[::2]) == [*"abcdefgh"]
+    assert first != second
+
+
 def test_what_an_arm_missed_is_flown_for_longer() -> None:
     rows = [
         *fault_rows("garl", {"gate": [5, None, None, None]}),
