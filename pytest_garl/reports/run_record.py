@@ -565,7 +565,7 @@ class RunRecord:
         return sum(sum(search.crashes.values()) for search in self.searches)
 
     @property
-    def archive(self) -> Mapping[str, Counter[str]]:
+    def types_by_phase(self) -> Mapping[str, Counter[str]]:
         """How many flights have which type of violation, by the phase in which it begins."""
         counts: dict[str, Counter[str]] = {}
         for kind in self.kinds:

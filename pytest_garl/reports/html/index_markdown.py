@@ -29,12 +29,12 @@ def page_link(kind: KindRow, folder: Path, url: str) -> str:
 
 
 def index_parts(page: RunPage, folder: Path, url: str) -> list[str]:
-    """Return the parts of a summary: where the pages are, pictures, archive, domain and cost."""
+    """Return the parts of a summary: where the pages are, pictures, phases, domain and cost."""
     from pytest_garl.reports.html.run_page import (
-        archive_rows,
         cost_rows,
         domain_rows,
         origin_rows,
+        phase_rows,
     )
     from pytest_garl.reports.run_record import PHASES
 
@@ -49,7 +49,7 @@ def index_parts(page: RunPage, folder: Path, url: str) -> list[str]:
     parts += _pictures(page, url) if url else []
     rows = [
         (escaped(name), *(str(count or "") for count, _ in cells), escaped(meaning))
-        for name, meaning, cells in archive_rows(page.run)
+        for name, meaning, cells in phase_rows(page.run)
     ]
     parts += [table(("type", *PHASES, "what it means"), rows)] if rows else []
     facts = (

@@ -153,20 +153,14 @@ def figures(search: SearchRecord) -> list[Fact]:
             ),
             ("time to the touchdown", f"median {time_s.median:.1f} s, worst {time_s.worst:.1f} s"),
         ]
-    told = search.told
-    found.append(("how scenarios were made", told.get("origins", "")))
-    if search.model is not None:
-        found.append(
-            (
-                "error of the model's margins",
-                f"{search.model.error:.2f} of a safe margin, {search.model.error_of_mean:.2f} by "
-                "the mean of earlier flights",
-            )
-        )
+    told, model = search.told, search.model
+    if model is not None:
+        mean = f"{model.error_of_mean:.2f} by the mean of earlier flights"
+        found.append(("error of the model's margins", f"{model.error:.2f} of a safe one, {mean}"))
     found += [
-        ("who moved the NPCs", told.get("movers", "")),
+        ("NPCs", told.get("movers", "")),
         ("how good the director of NPCs was", told.get("director", "")),
-        ("who let events strike", told.get("strikes", "")),
+        ("events", told.get("strikes", "")),
         ("how good the director of events was", told.get("event director", "")),
     ]
     return [figure for figure in found if figure[1]]
@@ -239,12 +233,16 @@ def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
 
 def control_rows(run: RunRecord) -> list[Fact]:
     """Return how diverse the kinds of each search are, and what random flights found beside it."""
-    return [(search.name, text) for search in run.searches for text in search.remarks]
+    texts = (
+        (each.name, (each.diversity, each.told.get("control", ""), each.told.get("origins", "")))
+        for each in run.searches
+    )
+    return [(name, text) for name, own in texts for text in own if text]
 
 
-def archive_rows(run: RunRecord) -> list[tuple[str, str, list[tuple[int, int]]]]:
+def phase_rows(run: RunRecord) -> list[tuple[str, str, list[tuple[int, int]]]]:
     """Return type, meaning and, by phase, (number, shade from 0 to 4) of its flights."""
-    counts = run.archive
+    counts = run.types_by_phase
     most = max((count for row in counts.values() for count in row.values()), default=1)
     cells = {
         name: [(row[phase], _shade(row[phase], most)) for phase in PHASES]
