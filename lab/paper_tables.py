@@ -130,7 +130,8 @@ def _landing_systems(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
 def _methods(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
     """Return the table of RQ2: each figure of the paper, a slash, and that of this code."""
     lines = []
-    for each in searches_of(experiment, experiment.grids[1], rows):
+    grids = experiment.grids[1:]
+    for each in (each for grid in grids for each in searches_of(experiment, grid, rows)):
         shares, top10, distance, coverage, hours = PUBLISHED_METHODS.get(
             (each.method, each.map), (NONE,) * 5
         )
