@@ -130,8 +130,8 @@ def _landing_systems(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
 def _methods(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
     """Return the table of RQ2: each figure of the paper, a slash, and that of this code."""
     lines = []
-    grids = experiment.grids[1:]
-    for each in (each for grid in grids for each in searches_of(experiment, grid, rows)):
+    searches = [one for grid in experiment.grids[1:] for one in searches_of(experiment, grid, rows)]
+    for each in searches:
         shares, top10, distance, coverage, hours = PUBLISHED_METHODS.get(
             (each.method, each.map), (NONE,) * 5
         )
@@ -158,22 +158,23 @@ def _paired(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
     The paper's method has the rivals of the paper, ``garl`` those of a grid of its own.
     """
     found = {(row.map, row.method, row.seed): row for row in rows if row.system == "MM-MLS"}
+    owns = zip(experiment.grids[1:], (OWN, "garl"), strict=True)
+    rivals = [(grid, own, each) for grid, own in owns for each in grid.methods if each != own]
     lines = []
-    for grid, own in zip(experiment.grids[1:], (OWN, "garl"), strict=True):
-        for rival in (each for each in grid.methods if each != own):
-            pairs = [
-                (found[map, own, seed], found[map, rival, seed])
-                for map in grid.maps
-                for seed in grid.seeds
-                if (map, own, seed) in found and (map, rival, seed) in found
-            ]
-            if not pairs:
-                continue
-            cells = []
-            for metric in (ITS_CODE, VIOLATIONS):
-                gaps = [metric.value_of(one) - metric.value_of(other) for one, other in pairs]
-                cells.append(f"{np.mean(gaps):+.{metric.digits}f} ({p_of_signs(gaps):.2f})")
-            lines.append([own, rival, str(len(pairs)), *cells])
+    for grid, own, rival in rivals:
+        pairs = [
+            (found[map, own, seed], found[map, rival, seed])
+            for map in grid.maps
+            for seed in grid.seeds
+            if (map, own, seed) in found and (map, rival, seed) in found
+        ]
+        if not pairs:
+            continue
+        cells = []
+        for metric in (ITS_CODE, VIOLATIONS):
+            gaps = [metric.value_of(one) - metric.value_of(other) for one, other in pairs]
+            cells.append(f"{np.mean(gaps):+.{metric.digits}f} ({p_of_signs(gaps):.2f})")
+        lines.append([own, rival, str(len(pairs)), *cells])
     header = ("method", "less", "pairs", ITS_CODE.title, "our definition, %")
     return markdown(header, lines) if lines else ""
 

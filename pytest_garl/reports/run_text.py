@@ -83,6 +83,6 @@ def counts_text(counts: Mapping[Any, int]) -> str:
 
 
 def percent(count: float, total: int, sign: str = " %") -> str:
-    """Return a share in per cent: whole, but with a decimal below 0.5 or of over a hundred."""
+    """Return a share in per cent: whole; if below 0.5, or of over a hundred, with a decimal."""
     share = 100 * count / total
     return f"{share:.{int(total > 100 or 0 < share < 0.5)}f}{sign}"

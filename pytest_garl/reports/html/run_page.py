@@ -232,7 +232,7 @@ def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
 
 
 def control_rows(run: RunRecord) -> list[Fact]:
-    """Return how diverse the kinds of each search are, and what random flights found beside it."""
+    """Return how diverse the kinds of each search are, and how it stands beside random flights."""
     texts = (
         (each.name, (each.diversity, each.told.get("control", ""), each.told.get("origins", "")))
         for each in run.searches
