@@ -155,11 +155,17 @@ def _methods(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
 def _paired(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
     """Return methods less their rivals, paired by map and seed; empty without pairs.
 
-    The paper's method has the rivals of the paper, ``garl`` those of a grid of its own.
+    The paper's method has the rivals of the paper, ``garl`` those of a grid of its own, whose
+    first, with learned NPCs, is compared with those written by hand as well.
     """
     found = {(row.map, row.method, row.seed): row for row in rows if row.system == "MM-MLS"}
-    owns = zip(experiment.grids[1:], (OWN, "garl"), strict=True)
-    rivals = [(grid, own, each) for grid, own in owns for each in grid.methods if each != own]
+    _, papers, own_rivals = experiment.grids
+    learned, *by_hand = own_rivals.methods
+    rivals = [
+        *((papers, OWN, each) for each in papers.methods if each != OWN),
+        *((own_rivals, "garl", each) for each in own_rivals.methods),
+        *((own_rivals, learned, each) for each in by_hand),
+    ]
     lines = []
     for grid, own, rival in rivals:
         pairs = [

@@ -41,20 +41,33 @@ def policy_names() -> tuple[str, ...]:
     return learned_policies() + scripted_policies()
 
 
+def names_policy(text: str) -> bool:
+    """Whether a text is a name that :func:`policy_spec` takes; what it names may not exist."""
+    return text in policy_names() or text.endswith(".npz") or ":" in text
+
+
+def expected_policies() -> str:
+    """Return what names a policy, for help and errors."""
+    return (
+        f"one of {', '.join(policy_names())}, weights (.npz) that `garl train` wrote, or "
+        "'module:class' of an importable module"
+    )
+
+
 def policy_spec(name: str) -> PolicySpec:
-    """Return the specification of a shipped policy, or of weights in a file.
+    """Return the specification of a shipped policy, of weights in a file, or of a user's class.
 
     Raises PolicyError for an unknown name, and for weights that cannot be trusted.
     """
-    if name in scripted_policies():
-        from pytest_garl.simulation.npc_policy import PolicySpec
+    if not names_policy(name):
+        raise PolicyError(f"unknown NPC policy {name!r}; expected {expected_policies()}")
+    if name in learned_policies() or name.endswith(".npz"):
+        from pytest_garl.npcs.learned import learned_spec
 
-        return PolicySpec(name=name, factory=f"{__package__}.policies.{name}:POLICY")
-    if name not in learned_policies() and not name.endswith(".npz"):
-        raise PolicyError(
-            f"unknown NPC policy {name!r}; expected one of {', '.join(policy_names())}, "
-            "or the path of weights (.npz) that `garl train` wrote"
-        )
-    from pytest_garl.npcs.learned import learned_spec
+        return learned_spec(name)
+    from pytest_garl.simulation.npc_policy import PolicySpec
 
-    return learned_spec(name)
+    shipped = name in scripted_policies()
+    return PolicySpec(
+        name=name, factory=f"{__package__}.policies.{name}:POLICY" if shipped else name
+    )

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import pytest
 
 from pytest_garl.files.run_files import CASES_FOLDER, RUN_FOLDER
-from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY, policy_names
+from pytest_garl.npcs.policy_catalogue import DEFAULT_POLICY, expected_policies
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.search.method_catalogue import DEFAULT_METHOD, method_names
 
@@ -123,8 +123,8 @@ OPTIONS = (
     Option(
         name="npcs",
         metavar="POLICY",
-        help=f"NPC policy, which moves people, dogs and birds: {', '.join(policy_names())}, or "
-        "weights (.npz) that `garl train` wrote (default: as the domain says, graded with its "
+        help=f"NPC policy, which moves people, dogs and birds: {expected_policies()} "
+        "(default: as the domain says, graded with its "
         "learned director where NPCs may interfere; in the domain paper "
         f"{DEFAULT_POLICY}, and the methods of the paper have their own, see docs/methods.md; with "
         "--garl-repeat the policy of the search).",

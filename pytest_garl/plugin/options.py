@@ -14,7 +14,7 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.files.run_files import ARCHIVE, CASES_FOLDER, REPEAT_LEDGER, SEARCH_LEDGER
 from pytest_garl.npcs.domain_policy import domain_with_policy, policy_in
-from pytest_garl.npcs.policy_catalogue import policy_names
+from pytest_garl.npcs.policy_catalogue import expected_policies, names_policy
 from pytest_garl.plugin.arguments import OPTIONS, Option
 from pytest_garl.plugin.xdist import CONTROLLER, SEED, is_xdist_worker
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
@@ -294,11 +294,8 @@ def _domain(config: pytest.Config) -> Domain:
 
 
 def _npcs(text: str) -> str:
-    if not text or text in policy_names():
-        return text
-    if not text.endswith(".npz"):
-        expected = f"one of {', '.join(policy_names())}, or weights (.npz) that `garl train` wrote"
-        raise _wrong("npcs", text, expected)
+    if text and not names_policy(text):
+        raise _wrong("npcs", text, expected_policies())
     return text
 
 

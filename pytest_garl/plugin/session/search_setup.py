@@ -18,7 +18,7 @@ from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.execution.sources import combined_sha256, data_files, source_hashes
-from pytest_garl.npcs.policy_catalogue import policy_names, policy_spec
+from pytest_garl.npcs.policy_catalogue import names_policy, policy_names, policy_spec
 from pytest_garl.npcs.policy_check import check_policy
 from pytest_garl.plugin.items.target import Target
 from pytest_garl.plugin.options import Options
@@ -132,7 +132,7 @@ class Searches:
         """Return the policy of a target's NPCs, unless a fixture names one."""
         options, earlier = self.options, target.stored_flight
         stored = earlier.npcs if earlier else ""
-        if not options.npcs and (stored in policy_names() or stored.endswith(".npz")):
+        if not options.npcs and names_policy(stored):
             return stored
         return options.policy_in(target.domain)
 

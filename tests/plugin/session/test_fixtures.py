@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import fnmatch
+
 import pytest
 
 from tests.support.landing_project import (
@@ -54,4 +56,32 @@ def test_the_npcs_fixture_takes_a_name(pytester: pytest.Pytester, fixture: str, 
     result = run(pytester, "--garl-budget=2", "--garl-workers=0")
     output = result.stdout.str() + result.stderr.str()
     assert (error in output) if error else (result.ret in (0, 1))
+    assert "Traceback" not in output
+
+
+def test_a_class_that_the_command_line_names_moves_the_npcs(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    pytester.makepyfile(
+        walkers="from pytest_garl.npcs.policies.greedy import Greedy\n"
+        "class Mine(Greedy):\n    pass\n"
+    )
+    result = run(pytester, "--garl-budget=1", "--garl-workers=0", "--garl-npcs=walkers:Mine")
+    result.stdout.fnmatch_lines(["domain *, NPCs walkers:Mine"])
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("walkers:Mine", "'walkers:Mine' cannot be loaded (No module named 'walkers'); expected"),
+        ("walkers", "'walkers', expected one of *, or 'module:class' of an importable module"),
+    ],
+)
+def test_what_the_command_line_names_must_exist(
+    pytester: pytest.Pytester, name: str, words: str
+) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-budget=1", "--garl-workers=0", f"--garl-npcs={name}")
+    assert result.ret not in (0, 1)
+    output = result.stdout.str() + result.stderr.str()
+    assert fnmatch.fnmatch(output, f"*{words}*")
     assert "Traceback" not in output
