@@ -7,6 +7,7 @@ their keys.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
@@ -259,7 +260,7 @@ def _read_runs(table: Table, name: str) -> MoveList:
         x, y = finite(x), finite(y)
         if type(times) is not int or times < 1 or x is None or y is None:
             raise table.error(name, f"found {shown(run)}, {expected}")
-        if not max(abs(x), abs(y)) <= 1 or not x**2 + y**2 <= 1 + 1e-9:
+        if not math.hypot(x, y) <= 1 + 1e-9:
             raise table.error(name, f"found {shown(run)}, {expected}")
         if len(moves) + times > MOST_MOVES:
             raise table.error(

@@ -15,7 +15,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.shrinking.case_request import CaseRequest, CaseResult, FailingScenario
-from pytest_garl.shrinking.move_reduction import short_moves
+from pytest_garl.shrinking.move_reduction import shortened
 from pytest_garl.shrinking.plan import ESCAPE_FLIGHTS, NEIGHBOURS, Step
 from pytest_garl.shrinking.prevention import collision_of, prevention_of
 from pytest_garl.shrinking.robustness import neighbours
@@ -65,8 +65,8 @@ class CaseFlights:
         return self._live[scenario]
 
     def live_behaviour(self, scenario: Scenario) -> RecordedBehaviour:
-        """Return what the objects did in the live flight of a scenario."""
-        return recorded_behaviour(self._live[scenario], scenario, self.map)
+        """Return what the objects did in the live flight of a scenario, in few digits."""
+        return shortened(recorded_behaviour(self._live[scenario], scenario, self.map))
 
     def without_idle(self, scenario: Scenario) -> Scenario:
         """Return a violation of the search without the conditions whose data was never read.
@@ -238,11 +238,7 @@ def without_idle(request: CaseRequest, scenario: Scenario, flight: CompletedFlig
 
 
 def recorded_behaviour(flight: CompletedFlight, scenario: Scenario, map: Map) -> RecordedBehaviour:
-    """Return what each object did in a flight; no moves if the flight left no record.
-
-    Moves have four digits after the point, so that a file of many moves stays short: a case is
-    flown with them before it is saved.
-    """
+    """Return what each object did in a flight, exactly; no moves if the flight left no record."""
     names = [name for name, _ in map.without(scenario.removed_objects).present_objects]
     if not flight.record.exists():
         return RecordedBehaviour(moves=tuple((name, ()) for name in names))
@@ -250,8 +246,7 @@ def recorded_behaviour(flight: CompletedFlight, scenario: Scenario, map: Map) ->
     made = {item.name: item.moves for item in objects}
     return RecordedBehaviour(
         moves=tuple(
-            (name, short_moves((float(x), float(y)) for x, y in made.get(name, ())))
-            for name in names
+            (name, tuple((float(x), float(y)) for x, y in made.get(name, ()))) for name in names
         ),
         changes=tuple((item.name, item.changes) for item in objects if item.changes),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from pytest_garl.cases.case import MoveList, Moves, RecordedBehaviour
 from pytest_garl.flight.flight import Flight
@@ -36,9 +36,15 @@ def rounded(behaviour: RecordedBehaviour) -> RecordedBehaviour:
     return RecordedBehaviour(moves=moves, changes=behaviour.changes)
 
 
-def short_moves(moves: Iterable[tuple[float, float]]) -> MoveList:
-    """Return moves with four digits after the point, none longer than it was."""
-    return tuple((_short(x), _short(y)) for x, y in moves)
+def shortened(behaviour: RecordedBehaviour) -> RecordedBehaviour:
+    """Return the behaviour with four digits after the point, no move longer than it was.
+
+    A file of many moves stays short.  It is another behaviour: it must be flown before it is saved.
+    """
+    moves = tuple(
+        (name, tuple((_short(x), _short(y)) for x, y in own)) for name, own in behaviour.moves
+    )
+    return RecordedBehaviour(moves=moves, changes=behaviour.changes)
 
 
 def _short(share: float) -> float:

@@ -29,7 +29,8 @@ from pytest_garl.verdicts.verdict import Verdict
 def case_without_flights(request: CaseRequest) -> CaseResult:
     """Return the simplest violation of the search as a case, without another flight.
 
-    A finding, which went wrong before a flight's end, is no case until another flight shows it.
+    Its objects repeat their moves to the last digit, so that it has the flight of the search.  A
+    finding, which went wrong before a flight's end, is no case until another flight shows it.
     """
     if request.finding:
         return CaseResult(

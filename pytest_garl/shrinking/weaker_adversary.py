@@ -15,7 +15,7 @@ from pytest_garl.shrinking.case_flights import (
     recorded_behaviour,
 )
 from pytest_garl.shrinking.case_request import FailingScenario
-from pytest_garl.shrinking.move_reduction import rounded
+from pytest_garl.shrinking.move_reduction import rounded, shortened
 from pytest_garl.shrinking.plan import (
     CROSSING,
     CROSSING_AGAIN,
@@ -62,7 +62,7 @@ def confirm_crossing(flights: CaseFlights, first: Scenario) -> FailingScenario |
         tried.append(scenario)
         flight = flights.fly_moved_by(scenario, policy_spec(CARELESS))
         if flights.request.fails(scenario, flight):
-            behaviour = recorded_behaviour(flight, scenario, map)
+            behaviour = shortened(recorded_behaviour(flight, scenario, map))
             found = FailingScenario(
                 origin=first, scenario=scenario, behaviour=behaviour, flight=flight
             )

@@ -1,16 +1,9 @@
 from __future__ import annotations
 
 import dataclasses
-import types
-from pathlib import Path
-from typing import Any
-
-import numpy as np
-import pytest
 
 from pytest_garl.cases.case import RecordedBehaviour
-from pytest_garl.shrinking import case_flights
-from pytest_garl.shrinking.case_flights import CaseFlights, recorded_behaviour
+from pytest_garl.shrinking.case_flights import CaseFlights
 from pytest_garl.shrinking.plan import ESCAPE_FLIGHTS, NEIGHBOURS
 from pytest_garl.shrinking.robustness import neighbours
 from tests.cases.samples import (
@@ -71,18 +64,3 @@ def test_confirm_flies_no_neighbours_of_a_scenario_that_passes() -> None:
         is None
     )
     assert fly.count == 1
-
-
-def test_recorded_moves_have_four_digits_and_are_no_longer_than_they_were(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    made = np.array([[0.8080573960675794, -0.5891037639164115], [-1.0, 0.0], [0.57, -0.0]])
-    dog = types.SimpleNamespace(name="dog-1", moves=made, changes=())
-    monkeypatch.setattr(case_flights, "load", lambda path: types.SimpleNamespace(objects=[dog]))
-    record = tmp_path / "flight.npz"
-    record.touch()
-    flight: Any = types.SimpleNamespace(record=record)
-    found = recorded_behaviour(flight, VIOLATING_SCENARIO, LAWN)
-    moves = dict(found.moves)["dog-1"]
-    assert moves == ((0.808, -0.5891), (-1.0, 0.0), (0.57, 0.0))
-    assert "-0.0)" not in repr(moves)

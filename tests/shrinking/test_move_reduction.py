@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pytest_garl.cases.case import RecordedBehaviour
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.npcs.policy_catalogue import policy_spec
 from pytest_garl.npcs.recorded import recorded_spec
@@ -17,7 +18,7 @@ from pytest_garl.scenarios.placed import Placed
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.shrinking.case_flights import find_colliding_object, recorded_behaviour
-from pytest_garl.shrinking.move_reduction import _round, shorter_records
+from pytest_garl.shrinking.move_reduction import _round, shortened, shorter_records
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.cases.samples import (
@@ -40,6 +41,13 @@ def test_flight_without_a_record_has_no_moves() -> None:
     remaining = VIOLATING_SCENARIO.without(OBJECT_NAMES[-1])
     found = recorded_behaviour(flight(SIGNATURE), remaining, LAWN)
     assert found.moves == tuple((name, ()) for name in OBJECT_NAMES[:-1])
+
+
+def test_shortened_moves_have_four_digits_and_are_no_longer_than_they_were() -> None:
+    made = ((0.8080573960675794, -0.5891037639164115), (-1.0, 0.0), (0.57, -0.0))
+    found = shortened(RecordedBehaviour(moves=((COLLIDING_OBJECT, made),)))
+    assert found.moves == ((COLLIDING_OBJECT, ((0.808, -0.5891), (-1.0, 0.0), (0.57, 0.0))),)
+    assert "-0.0)" not in repr(found.moves)
 
 
 def test_collision_names_the_object_that_was_hit() -> None:

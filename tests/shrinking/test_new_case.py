@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import pytest
 
@@ -10,19 +11,27 @@ from pytest_garl.cases.case import (
     Prevention,
     RecordedBehaviour,
 )
+from pytest_garl.cases.case_file import dump_case, parse_case
+from pytest_garl.cases.replay import replay
 from pytest_garl.cases.user_failure import UserFailure
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.severity import Severity
+from pytest_garl.flight.flight_file import save
 from pytest_garl.npcs.policy_catalogue import policy_spec
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.shrinking.case_request import FailingScenario
 from pytest_garl.shrinking.new_case import case_without_flights, new_case
+from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.cases.samples import (
     COLLIDING_OBJECT,
+    LAWN,
     OBJECT_NAMES,
     SIGNATURE,
     VIOLATING_SCENARIO,
     make_case_request,
+    result_of,
 )
 
 DQN = policy_spec("dqn")
@@ -92,6 +101,22 @@ def test_case_without_flights_is_the_simplest_violation() -> None:
     assert result.case is not None
     assert result.case.scenario == SIMPLE
     assert (result.flights, result.case.evidence.neighbours) == (0, 0)
+
+
+@pytest.mark.sim
+def test_case_without_flights_has_the_flight_of_the_search_in_its_file(tmp_path: Path) -> None:
+    """Moves of few digits would be another flight, and nobody has flown it."""
+    flight = fly(VIOLATING_SCENARIO, ReferencePilot, policy_spec("greedy"), map=LAWN)
+    save(flight, tmp_path / "flight.npz")
+    found = CompletedFlight(
+        result=result_of(SIGNATURE), sha256=flight.sha256, record=tmp_path / "flight.npz"
+    )
+    request = dataclasses.replace(REQUEST, violations=((VIOLATING_SCENARIO, found),))
+    made = case_without_flights(request).case
+    assert made is not None
+    pilot = f"{ReferencePilot.__module__}:{ReferencePilot.__qualname__}"
+    text = dump_case(dataclasses.replace(made, system=pilot))
+    assert replay(parse_case(text, load_map), tmp_path).same_flight is True
 
 
 def test_case_of_a_crossing_gates_if_its_entry_has_a_window() -> None:
