@@ -182,7 +182,11 @@ def report(rows: Sequence[Row]) -> str:
     if OURS in arms:
         parts += [_ratios(found, lost, [arm for arm in arms if arm != OURS], control)]
     chance = [row for row in all_ if row["fault"] == PLACEBO.name]
-    parts += [_longer(rows), _misses(lost, arms), _placebo(chance)]
+    parts += [
+        _longer([row for row in rows if row["fault"] != PLACEBO.name]),
+        _misses(lost, arms),
+        _placebo(chance),
+    ]
     if left_out:
         parts.append(f"Left out, because not all arms have flown them: {left_out} searches.")
     parts.append(f"Flown at {', '.join(sorted({row['commit'] for row in rows}))}.")
