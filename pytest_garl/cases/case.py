@@ -231,7 +231,10 @@ class Case:
             return f"it collides too if the body comes at another time within {window_s:g} s"
         if not evidence.neighbours:
             return ""
-        return f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too"
+        failed = evidence.neighbours_failed
+        return (
+            f"{failed} of {evidence.neighbours} neighbours {'fails' if failed == 1 else 'fail'} too"
+        )
 
     @property
     def is_shrunk(self) -> bool:

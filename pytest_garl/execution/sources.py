@@ -116,8 +116,6 @@ def _cached_sha256(file: Path, *_: int) -> str:
 class _Module:
     name: str
     file: Path
-    submodule_folders: tuple[str, ...]
-    """Where the submodules are if this is a package; empty otherwise."""
     is_package: bool
 
     @property
@@ -162,10 +160,7 @@ def _defining(definition: Any) -> _Module | None:
     except (TypeError, OSError):
         return None
     is_package = file.name == "__init__.py"
-    folders = (str(file.parent),) if is_package else ()
-    return _Module(
-        name=definition.__module__, file=file, submodule_folders=folders, is_package=is_package
-    )
+    return _Module(name=definition.__module__, file=file, is_package=is_package)
 
 
 @functools.lru_cache(maxsize=1024)
@@ -227,14 +222,12 @@ def _find(name: str) -> _Module | None:
     spec = getattr(loaded, "__spec__", None) or _spec(name)
     if spec is None:
         return None
-    folders = tuple(spec.submodule_search_locations or ())
     # A package without __init__.py has no file of its own.
     file = Path(spec.origin) if spec.origin else None
     if file is None or not file.is_file():
         return None
-    return _Module(
-        name=name, file=file.resolve(), submodule_folders=folders, is_package=bool(folders)
-    )
+    is_package = bool(spec.submodule_search_locations)
+    return _Module(name=name, file=file.resolve(), is_package=is_package)
 
 
 def _spec(name: str) -> Any:

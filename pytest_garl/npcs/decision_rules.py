@@ -1,4 +1,4 @@
-"""Rules by which NPCs that perceive the UAV in part decide: rivals of the learned ones."""
+"""The rule by which NPCs that perceive the UAV in part go to it."""
 
 from __future__ import annotations
 
@@ -12,15 +12,6 @@ LATEST_S = 5.0
 """Nobody looks farther ahead."""
 
 
-class Direct:
-    """Goes to where it believes the UAV's column to be."""
-
-    def decide(self, belief: Belief) -> Move:
-        """Return the move straight there."""
-        x, y, _ = belief.uav_position_m
-        return towards((x, y), belief)
-
-
 class Intercepting:
     """Goes to where the UAV will be when it gets there, if that flies straight on."""
 
@@ -30,11 +21,3 @@ class Intercepting:
         distance = math.dist((x, y), belief.self.position_m[:2])
         ahead_s = min(LATEST_S, distance / max(0.1, belief.self.speed_mps))
         return towards((x + vx * ahead_s, y + vy * ahead_s), belief)
-
-
-class ToMarker:
-    """Goes to the marker and over it, whatever the UAV does."""
-
-    def decide(self, belief: Belief) -> Move:
-        """Return the move straight there."""
-        return towards(belief.marker_position_m, belief)

@@ -122,14 +122,13 @@ class Encounter:
     """How one NPC meets a UAV on its recorded way, if it begins at a moment.
 
     ``contact_s`` is when they touch, None if they do not; ``seen_s`` when the UAV sees the NPC for
-    the first time; ``nearest_m`` the least horizontal distance, and ``nearest_s`` when that was.
+    the first time; ``nearest_m`` the least horizontal distance.
     """
 
     moment_s: float
     contact_s: float | None
     seen_s: float | None
     nearest_m: float
-    nearest_s: float
 
     def meets(self, until_s: float = math.inf) -> bool | None:
         """Return whether they meet; None if the UAV saw the NPC, and what it does then is unknown.
@@ -203,7 +202,7 @@ class Passage:
         # It perceives later what it sees before it begins; a body that waits does not move.
         first = max(0, round((moment_s - WATCHES_S) / DECISION_STEP_S)) * _STEPS
         policy.reset(self._situation(npc, placed, first), np.random.default_rng(0))
-        way, contact_s, nearest, left = [], None, (math.inf, 0.0), AFTERMATH_STEPS
+        way, contact_s, nearest_m, left = [], None, math.inf, AFTERMATH_STEPS
         for step in range(first, self._last + 1):
             time_s, uav_m = float(self._times[step]), self._places[step]
             if step % _STEPS == 0:
@@ -217,7 +216,7 @@ class Passage:
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ)
             way.append(npc.position_m)
             away_m = math.dist(npc.position_m[:2], uav_m[:2])
-            nearest = min(nearest, (away_m, time_s))
+            nearest_m = min(nearest_m, away_m)
             if away_m < self._reach_m and self._touches(npc, time_s, uav_m):
                 contact_s = time_s
                 break
@@ -225,8 +224,7 @@ class Passage:
             moment_s=moment_s,
             contact_s=contact_s,
             seen_s=self._seen_s(first, way),
-            nearest_m=nearest[0],
-            nearest_s=nearest[1],
+            nearest_m=nearest_m,
         )
 
     def _situation(self, npc: Npc, placed: Placed, step: int) -> Situation:

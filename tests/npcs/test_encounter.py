@@ -112,9 +112,7 @@ def test_a_uav_needs_time_to_notice_and_to_escape() -> None:
 def test_what_is_known_ends_when_the_uav_sees_it(
     contact_s: float | None, seen_s: float | None, until_s: float, meets: bool | None
 ) -> None:
-    found = Encounter(
-        moment_s=1.0, contact_s=contact_s, seen_s=seen_s, nearest_m=0.0, nearest_s=5.0
-    )
+    found = Encounter(moment_s=1.0, contact_s=contact_s, seen_s=seen_s, nearest_m=0.0)
     assert found.meets(until_s) is meets
 
 

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from pytest_garl.npcs.decision_rules import Direct
+from pytest_garl.npcs.decision_rules import Intercepting
 from pytest_garl.npcs.grades import GRADE_LIMITS
 from pytest_garl.npcs.interference import Belief, Interfering, Perception, Sighting, kept_away
 from pytest_garl.scenarios.bodies import discs_of
@@ -74,7 +74,7 @@ def test_a_curious_one_does_not_go_under_the_rotors() -> None:
 def test_it_interferes_for_its_time_and_leaves(grade: str, number: float) -> None:
     values = {"grade": number, "lasts_s": 4.0, "delay_s": 1.0}
     scenario = scenario_with("person-1", (-6.0, 0.0), 2.0, values)
-    policy = Interfering(grade, Direct())
+    policy = Interfering(grade, Intercepting())
     places = walk(
         scenario, "person-1", seconds=30, policy=policy, uav=lambda time_s: (0.0, 0.0, 4.0)
     )
@@ -89,7 +89,7 @@ def test_it_interferes_for_its_time_and_leaves(grade: str, number: float) -> Non
 def test_a_chase_lasts_five_seconds_at_most() -> None:
     values = {"grade": 2.0, "lasts_s": 20.0}
     scenario = scenario_with("dog-1", (-8.0, 0.0), 6.0, values)
-    policy = Interfering("chasing", Direct())
+    policy = Interfering("chasing", Intercepting())
     places = walk(scenario, "dog-1", seconds=25, policy=policy, uav=lambda time_s: (0.0, 0.0, 3.0))
     under = np.hypot(places[:, 0], places[:, 1]) < 3.0
     assert 0 < under.sum() * TICK_S < 7.0
