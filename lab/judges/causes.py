@@ -275,16 +275,18 @@ def report(rows: Sequence[Row]) -> str:
     if not rows:
         return "nothing is flown"
     arms = list(dict.fromkeys(row["arm"] for row in rows))
-    counts = {
-        arm: {(r["seed"], r["system"]): float(r["count"]) for r in rows if r["arm"] == arm}
-        for arm in arms
-    }
+    counts, smallest = (
+        {arm: {(r["seed"], r["system"]): count(r) for r in rows if r["arm"] == arm} for arm in arms}
+        for count in (_count, _smallest)
+    )
     lines = [
         "Distinct confirmed causes of a search; differences and ratios to garl over pairs of seed "
-        "and system, with 95 % intervals; p of the test that flips signs.",
+        "and system, with 95 % intervals; p of the test that flips signs.  Smallest are those that "
+        "contain no other cause of the search.",
         "",
-        "| arm | searches | causes | violations | signatures | garl less it | garl, times | p |",
-        "| --- | ---: | --- | ---: | ---: | --- | --- | ---: |",
+        "| arm | searches | causes | violations | signatures | garl less it | garl, times | p "
+        "| smallest | garl less it | garl, times | p |",
+        "| --- | ---: | --- | ---: | ---: | --- | --- | ---: | --- | --- | --- | ---: |",
     ]
     for arm in arms:
         own = [row for row in rows if row["arm"] == arm]
@@ -294,11 +296,22 @@ def report(rows: Sequence[Row]) -> str:
             f"{np.mean([int(row['violations']) for row in own]):.1f}",
             f"{np.mean([int(row['signatures']) for row in own]):.1f}",
             *_against(counts, arm),
+            mean_of([*smallest[arm].values()]).text(1),
+            *_against(smallest, arm),
         ]
         lines.append(f"| {arm} | {' | '.join(cells)} |")
     lines += ["", *_by_system(rows, arms), "", _by_origin(rows)]
     commits = ", ".join(sorted({row["commit"] for row in rows}))
     return "\n".join([*lines, "", f"Flown at {commits}."])
+
+
+def _count(row: Row) -> float:
+    return float(row["count"])
+
+
+def _smallest(row: Row) -> float:
+    found = {frozenset(each["cause"]) for each in json.loads(row["causes"])}
+    return sum(not any(other < each for other in found) for each in found)
 
 
 def _against(counts: dict[str, dict[tuple[str, str], float]], arm: str) -> list[str]:
@@ -319,10 +332,8 @@ def _by_system(rows: Sequence[Row], arms: Sequence[str]) -> list[str]:
     systems = list(dict.fromkeys(row["system"] for row in rows))
     lines = [f"| system | {' | '.join(arms)} |", f"| --- |{' ---: |' * len(arms)}"]
     for system in systems:
-        cells = []
-        for arm in arms:
-            own = [int(r["count"]) for r in rows if (r["arm"], r["system"]) == (arm, system)]
-            cells.append(f"{np.mean(own):.1f}" if own else "–")
+        own = [[_count(r) for r in rows if (r["arm"], r["system"]) == (a, system)] for a in arms]
+        cells = [f"{np.mean(each):.1f}" if each else "–" for each in own]
         lines.append(f"| {system} | {' | '.join(cells)} |")
     return lines
 
