@@ -232,8 +232,7 @@ def phases(steps: Sequence[Step], end_s: float) -> list[tuple[float, float, str]
             found.append((round(step.time_s, 2), round(end_s, 2), name))
             if len(found) > 1:
                 found[-2] = (found[-2][0], round(step.time_s, 2), found[-2][2])
-    named = [each for each in found if each[2]]
-    return named[:MOST_PHASES]
+    return [each for each in found if each[2]][:MOST_PHASES]
 
 
 def _targets(evidence: Evidence) -> list[list[float]]:

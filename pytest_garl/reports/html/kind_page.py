@@ -203,10 +203,14 @@ def _subject(plan: KindPlan) -> str:
     """Return which flight the page of a kind shows."""
     if plan.case is None or not _shows_case(plan):
         return f"{plan.kind.first}, the first flight"
-    if plan.case.is_shrunk:
-        return "the saved case, shrunk"
-    # A crash of the landing system is flown again with as little as possible, and has no severity.
-    return "the saved case, not shrunk" if plan.case.severity.about else "the saved case"
+    return f"the {tag_of(plan.case)}"
+
+
+def tag_of(case: Case) -> str:
+    """Return that a case is saved, and whether it was shrunk; a crash has nothing to shrink."""
+    if case.is_shrunk:
+        return "saved case, shrunk"
+    return "saved case, not shrunk" if case.severity.about else "saved case"
 
 
 def _capitalised(text: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pytest_garl.reports.html.kind_page import Fact, KindPage, KindPlan
+from pytest_garl.reports.html.kind_page import Fact, KindPage, KindPlan, tag_of
 from pytest_garl.reports.html.naming import still_address
 from pytest_garl.reports.run_record import (
     PHASES,
@@ -217,7 +217,7 @@ def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
         case.robustness if case else "",
         case.prevention.text.partition(":")[0] if case else "",
     ]
-    tag = "saved case" if case else ""
+    tag = tag_of(case) if case else ""
     if case and case.reason:
         tag = f"{tag}, gates nothing: {case.reason}"
     return KindRow(

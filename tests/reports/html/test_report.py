@@ -114,6 +114,17 @@ def test_what_shrinking_removed_agrees_with_what_the_page_says_it_took(run: Path
     page = html.unescape(kind_page(run))
     assert "nothing unusual" in page
     assert "1 of 2 conditions, not the marker's place" in page
+    assert '<span class="tag">saved case, shrunk' in pages(run)["index.html"]
+
+
+def test_the_index_tells_a_case_that_was_not_shrunk(run: Path) -> None:
+    found = read_run(run / ".garl" / "ledger.sqlite", Corpus(run / "none"), checked=True)
+    fog = Severity(about="conditions", conditions=("fog",), values=("",), untried=("fog",))
+    unshrunk = dataclasses.replace(case(SIGNATURE), system=SYSTEM, severity=fog)
+    saved = SavedCase(path=Path("a.toml"), case=unshrunk, known=False)
+    searches = tuple(each.with_cases([saved]) for each in found.searches)
+    write_html_report(dataclasses.replace(found, searches=searches), run / "report", films=0)
+    assert '<span class="tag">saved case, not shrunk' in pages(run)["index.html"]
 
 
 def test_the_same_ledger_gives_the_same_bytes(run: Path) -> None:
