@@ -43,7 +43,7 @@ each seed: the court for even ones, the lawn for odd ones.
   are paired by seed and system, with Student's t-interval over pairs, and p is of the exact test
   that flips the signs of differences.
 - Beside it, added after the first search had been seen: the causes that contain no other cause of
-  the same search.
+  the same search; a violation that takes no condition is one of them, and contained by none.
 
 **Judge 3, preventable violations** (``preventable.py``).  One NPC of grade `chasing` in clear
 weather, everything else nominal, on each system and each map, 100 flights an arm, seed 20.

@@ -311,7 +311,8 @@ def _count(row: Row) -> float:
 
 def _smallest(row: Row) -> float:
     found = {frozenset(each["cause"]) for each in json.loads(row["causes"])}
-    return sum(not any(other < each for other in found) for each in found)
+    # A violation that takes no condition is a cause of its own, not a part of each other one.
+    return sum(not any(other < each for other in found if other) for each in found)
 
 
 def _against(counts: dict[str, dict[tuple[str, str], float]], arm: str) -> list[str]:

@@ -373,14 +373,13 @@ def test_the_report_pairs_arms_by_seed_and_system() -> None:
 
 
 def test_the_report_counts_apart_the_causes_that_contain_no_other() -> None:
-    (row,) = cause_rows("garl", {("20", "opencv"): 4})
+    sets: list[list[str]] = [["fog"], ["fog", "rain"], ["dust", "light"], ["fog"], []]
+    (row,) = cause_rows("garl", {("20", "opencv"): len(sets)})
     found = json.loads(row["causes"])
-    for each, cause in zip(
-        found, (["fog"], ["fog", "rain"], ["dust", "light"], ["fog"]), strict=True
-    ):
+    for each, cause in zip(found, sets, strict=True):
         each["cause"] = cause
-    text = causes.report([{**row, "count": "3", "causes": json.dumps(found)}])
-    assert "| garl | 1 | 3.0 | 40.0 | 9.0 | – | – | – | 2.0 | – | – | – |" in text
+    text = causes.report([{**row, "count": "4", "causes": json.dumps(found)}])
+    assert "| garl | 1 | 4.0 | 40.0 | 9.0 | – | – | – | 3.0 | – | – | – |" in text
 
 
 # Judge 3
