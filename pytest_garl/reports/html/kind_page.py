@@ -207,7 +207,7 @@ def _subject(plan: KindPlan) -> str:
 
 
 def tag_of(case: Case) -> str:
-    """Return that a case is saved, and whether it was shrunk; a crash has nothing to shrink."""
+    """Return that a case is saved, and whether it was shrunk; that of a crash has no severity."""
     if case.is_shrunk:
         return "saved case, shrunk"
     return "saved case, not shrunk" if case.severity.about else "saved case"

@@ -15,6 +15,7 @@ from typing import Any
 import cv2
 import pytest
 
+from pytest_garl.cases.case import Case
 from pytest_garl.cases.corpus import Corpus
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.reference import Reference
@@ -97,8 +98,16 @@ def test_a_report_has_an_index_and_a_page_for_each_kind(run: Path) -> None:
     assert data_of(found[kind])["scene"]["ground"].startswith("data:image/jpeg")
 
 
+def write_with_case(folder: Path, saved: Case) -> None:
+    """Write the pages of a run whose violation has a saved case."""
+    found = read_run(folder / ".garl" / "ledger.sqlite", Corpus(folder / "none"), checked=True)
+    file = SavedCase(path=Path("a.toml"), case=saved, known=False)
+    searches = tuple(each.with_cases([file]) for each in found.searches)
+    told = dataclasses.replace(found, searches=searches, cases=(file,))
+    write_html_report(told, folder / "report", films=0)
+
+
 def test_what_shrinking_removed_agrees_with_what_the_page_says_it_took(run: Path) -> None:
-    found = read_run(run / ".garl" / "ledger.sqlite", Corpus(run / "none"), checked=True)
     sample = case(SIGNATURE)
     shrunk = dataclasses.replace(
         sample,
@@ -107,10 +116,7 @@ def test_what_shrinking_removed_agrees_with_what_the_page_says_it_took(run: Path
         severity=Severity(about="conditions"),
         evidence=dataclasses.replace(sample.evidence, removed="1 of 2 conditions"),
     )
-    saved = SavedCase(path=Path("a.toml"), case=shrunk, known=False)
-    searches = tuple(each.with_cases([saved]) for each in found.searches)
-    told = dataclasses.replace(found, searches=searches, cases=(saved,))
-    write_html_report(told, run / "report", films=0)
+    write_with_case(run, shrunk)
     page = html.unescape(kind_page(run))
     assert "nothing unusual" in page
     assert "1 of 2 conditions, not the marker's place" in page
@@ -118,12 +124,8 @@ def test_what_shrinking_removed_agrees_with_what_the_page_says_it_took(run: Path
 
 
 def test_the_index_tells_a_case_that_was_not_shrunk(run: Path) -> None:
-    found = read_run(run / ".garl" / "ledger.sqlite", Corpus(run / "none"), checked=True)
     fog = Severity(about="conditions", conditions=("fog",), values=("",), untried=("fog",))
-    unshrunk = dataclasses.replace(case(SIGNATURE), system=SYSTEM, severity=fog)
-    saved = SavedCase(path=Path("a.toml"), case=unshrunk, known=False)
-    searches = tuple(each.with_cases([saved]) for each in found.searches)
-    write_html_report(dataclasses.replace(found, searches=searches), run / "report", films=0)
+    write_with_case(run, dataclasses.replace(case(SIGNATURE), system=SYSTEM, severity=fog))
     assert '<span class="tag">saved case, not shrunk' in pages(run)["index.html"]
 
 
