@@ -58,7 +58,7 @@ def run_search(key: Key) -> dict[str, Any]:
     name, landing, seed, map_name = key
     map = load_map(map_name)
     genome = genome_of(domain_named("field"), map)
-    plan = SearchPlan(map=map, genome=genome, seed=int(seed), population=POPULATION)
+    plan = SearchPlan(map=map, genome=genome, seed=int(seed), flights=BUDGET, population=POPULATION)
     method, found = arm_named(name).make(plan), list[str]()
     for _ in range(BUDGET // POPULATION):
         scenarios = method.ask()

@@ -168,7 +168,7 @@ def pools(draws: int, executor: Executor) -> dict[str, Flights]:
 
 def garl_flights(landing: str, seed: int) -> Flights:
     """Return the flights of a search of `garl`."""
-    plan = SearchPlan(map=MAP, genome=GENOME, seed=seed, population=POPULATION)
+    plan = SearchPlan(map=MAP, genome=GENOME, seed=seed, flights=FLIGHTS, population=POPULATION)
     method, scenarios = Garl(plan), list[Scenario]()
     while len(scenarios) < FLIGHTS:
         asked = method.ask()

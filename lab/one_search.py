@@ -93,7 +93,9 @@ def plan_of(map_name: str, seed: int, flights: int) -> SearchPlan:
     """Return the plan of a search, with generations as large as those of pytest by default."""
     map = load_map(map_name)
     genome = genome_of(DOMAIN, map)
-    return SearchPlan(map=map, genome=genome, seed=seed, population=population(flights))
+    return SearchPlan(
+        map=map, genome=genome, seed=seed, flights=flights, population=population(flights)
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -172,7 +172,13 @@ def row_of(key: Key, pool: Executor) -> Mapping[str, Any]:
         npcs=policy_spec(default_policy(METHOD)),
         learns=False,
     )
-    plan = SearchPlan(map=MAP, genome=genome_of(domain, MAP), seed=int(seed), population=POPULATION)
+    plan = SearchPlan(
+        map=MAP,
+        genome=genome_of(domain, MAP),
+        seed=int(seed),
+        flights=FLIGHTS,
+        population=POPULATION,
+    )
     counted, hashes = 0, hashlib.sha256()
 
     def fly_all(npcs: PolicySpec, scenarios: Sequence[Scenario]) -> Iterator[Flown]:

@@ -110,6 +110,7 @@ def _count(ledger: Ledger, search: str, folder: Path) -> SearchCount:
         map=map,
         genome=genome,
         seed=int(facts["seed"]),
+        flights=int(facts["budget"]),
         population=int(facts["population"]),
         known=own.known,
         suspects=own.suspects,

@@ -25,7 +25,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
 
 FLIGHTS, MORE_FLIGHTS = 100, 400
-SEEDS, MORE_SEEDS = tuple(range(20, 25)), tuple(range(20, 23))
+SEEDS, MORE_SEEDS = tuple(range(23, 28)), tuple(range(23, 26))
 ARMS, MORE_ARMS = ("random", "exploring+", "garl", "shuffled"), ("garl", "exploring+")
 OURS = "garl"
 TWIN_SHARES = (0.98, 0.99, 1.01, 1.02)

@@ -31,7 +31,10 @@ def main(system: str, map_name: str, seed: int, flights: int, population: int) -
     made = Reference(module=module, file="", qualname=name).load()
     map = load_map(map_name)
     genome = genome_of(domain_named("field"), map)
-    plan = SearchPlan(map=map, genome=genome, seed=seed, population=population)
+    # That commit plans without the number of flights.
+    plan = SearchPlan(  # type: ignore[call-arg]
+        map=map, genome=genome, seed=seed, population=population
+    )
     method, npcs, flown = Garl(plan, EXPLORING), policy_spec("graded"), 0
     while flown < flights:
         told = []

@@ -142,7 +142,11 @@ class PreventableTask(Task):
         arm = dataclasses.replace(arm_named(self.arm), make=lambda plan: GivenScenarios(scenarios))
         map = load_map(self.map)
         plan = SearchPlan(
-            map=map, genome=genome_of(DOMAIN, map), seed=self.seed, population=GENERATION
+            map=map,
+            genome=genome_of(DOMAIN, map),
+            seed=self.seed,
+            flights=self.flights,
+            population=GENERATION,
         )
         latest: list[CompletedFlight] = []
         fly_all = functools.partial(fly_each, fly, latest)

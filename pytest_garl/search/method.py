@@ -23,7 +23,7 @@ class FlownScenario:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchPlan:
-    """The task of a search: its map, its genes, its seed and the size of a generation.
+    """The task of a search: its map, its genes, its seed, its flights and the size of a generation.
 
     ``known`` are flights of earlier searches that would fly alike today.  ``suspects`` are
     scenarios in which something failed that is not the same: another system, or this one before it
@@ -33,6 +33,7 @@ class SearchPlan:
     map: Map
     genome: Genome
     seed: int
+    flights: int
     population: int
     known: tuple[FlownScenario, ...] = ()
     suspects: tuple[Scenario, ...] = ()

@@ -269,6 +269,7 @@ def _load_archive(path: Path, rng: random.Random) -> None:
             map=_COURT,
             genome=genome,
             seed=0,
+            flights=12,
             population=4,
             known=own.known,
             suspects=own.suspects,

@@ -17,7 +17,7 @@ from pytest_garl.search.method import SearchPlan
 from tests.support.stories import scenario_with, walk
 
 MAP = load_map("lawn")
-PLAN = SearchPlan(map=MAP, genome=genome_of(DOMAIN, MAP), seed=200, population=20)
+PLAN = SearchPlan(map=MAP, genome=genome_of(DOMAIN, MAP), seed=200, flights=400, population=20)
 OURS = [name for name in ARMS if name != FROZEN]
 AT_DECISION = STORY_MOMENTS.index(DECIDED)
 

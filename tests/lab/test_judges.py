@@ -249,7 +249,7 @@ def test_what_an_arm_missed_is_flown_for_longer() -> None:
         *fault_rows("garl", {"gate": [5, None, None, None]}),
         *fault_rows("random", {"gate": [None]}),
     ]
-    longer = faults.missed(rows, faults.MORE_ARMS, faults.MORE_SEEDS)
+    longer = faults.missed(rows, faults.MORE_ARMS, range(20, 23))
     assert [(each.arm, each.seed, each.flights) for each in longer] == [
         ("garl", 21, 400),
         ("garl", 22, 400),

@@ -46,7 +46,11 @@ def searched(folder: Path, method: str) -> Path:
     ledger.add_search("s", "my_stack:Stack", "court", BUDGET, job.dumps())
     ledger.facts.note_search("s", SearchKey(system="my_stack:Stack", map="court", domain="field"))
     plan = SearchPlan(
-        map=MAP, genome=genome_of(domain_named("field"), MAP), seed=3, population=SIZE
+        map=MAP,
+        genome=genome_of(domain_named("field"), MAP),
+        seed=3,
+        flights=BUDGET,
+        population=SIZE,
     )
     wanted: dict[int, list[int]] = {}
     for slot in slots(BUDGET, SIZE):
@@ -83,11 +87,11 @@ def test_children_of_a_search_are_counted_checked_and_bred_again(tmp_path: Path)
 def test_a_child_of_flights_that_it_has_nothing_of_is_none(tmp_path: Path) -> None:
     path = searched(tmp_path, "garl")
     ledger = Ledger(path)
-    origins = [dataclasses.asdict(each) for each in ledger.facts.origins("s", 1)]
+    origins = [dataclasses.asdict(each) for each in ledger.facts.origins("s", 2)]
     ledger.close()
     child = next(each for each in origins if each["how"] == "bred")
-    child["parents"] = ["court-g02-s00", "court-g02-s01"]
-    changed(path, "origins of s 1", origins)
+    child["parents"] = ["court-g03-s00", "court-g03-s01"]
+    changed(path, "origins of s 2", origins)
     (found,) = count(path)
     assert found.true_children == found.children - 1
     text, holds = report([found], has_pymoo=True)

@@ -118,7 +118,9 @@ class Run:
         )
         (folder / "events.toml").write_text(DOMAIN)
         genome = genome_of(domain_named("events.toml", folder), MAP)
-        plan = SearchPlan(map=MAP, genome=genome, seed=2, population=SIZE)
+        plan = SearchPlan(
+            map=MAP, genome=genome, seed=2, flights=SIZE * GENERATIONS, population=SIZE
+        )
         self.ledger.add_search("s", "m:Good", "lawn", SIZE * GENERATIONS, job.dumps())
         self.teacher = Teacher()
         self._breeder = Breeder(

@@ -20,7 +20,7 @@ GENOME = genome_for(MAP)
 
 
 def plan(seed: int = 0, population: int = 8) -> SearchPlan:
-    return SearchPlan(map=MAP, genome=GENOME, seed=seed, population=population)
+    return SearchPlan(map=MAP, genome=GENOME, seed=seed, flights=40, population=population)
 
 
 def result(scenario: Scenario) -> FlightResult:

@@ -33,7 +33,7 @@ from tests.support.results import flight_result
 MAP = load_map("court")
 GENOME = genome_of(domain_named("field"), MAP)
 CALM = genome_of(domain_named("calm"), MAP)
-PLAN = SearchPlan(map=MAP, genome=GENOME, seed=1, population=20)
+PLAN = SearchPlan(map=MAP, genome=GENOME, seed=1, flights=100, population=20)
 
 
 def flights(
@@ -171,7 +171,7 @@ def test_a_scenario_that_cannot_be_read_is_named(tmp_path: Path) -> None:
 Made = list[list[Scenario]]
 
 
-def night(plan: SearchPlan, generations: int = 4) -> tuple[Made, list[str], list[FlownScenario]]:
+def night(plan: SearchPlan, generations: int = 5) -> tuple[Made, list[str], list[FlownScenario]]:
     """Return the generations of a search, how each scenario was made, and all flights."""
     method, made, hows, flown = Garl(plan), Made(), list[str](), list[FlownScenario]()
     for _ in range(generations):
@@ -191,8 +191,8 @@ def test_children_have_parents_of_an_earlier_night_and_the_control_stays_random(
     plain, _, _ = night(PLAN)
     assert made[0] == plain[0]
     assert made[1] != plain[1]
-    # The control of a night has 20 flights, the archive 80.
-    own = [how for how in hows[20:40] if how.startswith("bred")]
+    # The first children know 40 flights of their night, and the 100 of the archive.
+    own = [how for how in hows[60:80] if how.startswith("bred")]
     assert sum("archived-" in how for how in own) > len(own) / 2
     texts = [dump_scenario(each.scenario) for each in first]
     assert not {dump_scenario(each) for generation in made[1:] for each in generation} & {*texts}
@@ -201,11 +201,12 @@ def test_children_have_parents_of_an_earlier_night_and_the_control_stays_random(
 
 def test_a_named_parent_gave_the_child_a_condition() -> None:
     _, _, first = night(dataclasses.replace(PLAN, seed=0))
-    method = Garl(dataclasses.replace(PLAN, known=tuple(first)))
+    method = Garl(dataclasses.replace(PLAN, known=tuple(first), flights=40))
     control = method.ask()
     method.tell([FlownScenario(scenario=each, result=stand_in(each, MAP)) for each in control])
-    children = zip(method.ask(), method.origins, strict=True)
-    for child, origin in children:
+    made = [*zip(method.ask(), method.origins, strict=True)]
+    assert sum(origin.how == "bred" for _, origin in made) == 10
+    for child, origin in made:
         for parent in origin.parents:
             kind, _, number = parent.partition("-")
             other = first[int(number)].scenario if kind == "archived" else control[int(parent[-2:])]
@@ -218,5 +219,4 @@ def test_suspects_are_flown_once_in_places_of_stratified_scenarios() -> None:
     replayed = [place for place, how in enumerate(hows) if how.startswith("replayed")]
     assert [place // 20 for place in replayed] == [1, 1, 1, 1, 1, 2, 2]
     assert [made[place // 20][place % 20] for place in replayed] == [*suspects]
-    bred = [how.startswith("bred") for how in hows[20:]]
-    assert sum(bred) == 30
+    assert [how.startswith("bred") for how in hows] == [False] * 60 + [True] * 40

@@ -30,7 +30,7 @@ GENOME = genome_for(MAP)
 def searched(path: Path, name: str, budget: int, wanted: tuple[Slot, ...] = ()) -> Ledger:
     """Breed and fly, by a formula, until nothing is left to do."""
     size = population(budget)
-    plan = SearchPlan(map=MAP, genome=GENOME, seed=1, population=size)
+    plan = SearchPlan(map=MAP, genome=GENOME, seed=1, flights=budget, population=size)
     generations: dict[int, list[int]] = {}
     for slot in wanted or slots(budget, size):
         generations.setdefault(slot.generation, []).append(slot.index)
@@ -101,7 +101,7 @@ def test_a_generation_of_a_method_that_overlaps_is_added_while_the_one_before_is
 ) -> None:
     # The second generation waits for the first in any case.
     for name, expected in (("garl", [1, 3, 4, 4]), ("garl-paper", [1, 2, 3, 4])):
-        plan = SearchPlan(map=MAP, genome=GENOME, seed=1, population=4)
+        plan = SearchPlan(map=MAP, genome=GENOME, seed=1, flights=16, population=4)
         ledger = Ledger.create(tmp_path / f"{name}.sqlite", {})
         ledger.add_search("s", "m:S", "court", 16, "{}")
         wanted = {generation: range(4) for generation in range(4)}
@@ -119,7 +119,7 @@ def test_a_generation_of_a_method_that_overlaps_is_added_while_the_one_before_is
 
 
 def test_a_method_that_overlaps_proposes_the_same_if_it_is_told_at_once() -> None:
-    plan = SearchPlan(map=MAP, genome=GENOME, seed=1, population=8)
+    plan = SearchPlan(map=MAP, genome=GENOME, seed=1, flights=32, population=8)
     prompt, late = make_method("garl", plan), make_method("garl", plan)
     generations = []
     for _ in range(4):
@@ -141,7 +141,7 @@ def test_the_ledger_says_how_each_scenario_was_made(tmp_path: Path) -> None:
     assert [len(each) for each in noted] == [8, 8, 8, 8, 0]
     assert {each.how for each in noted[0]} == {"control"}
     children = [each for each in noted[2] if each.how == "bred"]
-    assert len(children) == 4
+    assert len(children) == 6
     flown = {f"court-g00-s{index:02d}" for index in range(8)}
     assert all(len(each.parents) >= 2 and {*each.parents} <= flown for each in children)
     ledger.close()
@@ -172,7 +172,7 @@ class Counts(Lessons):
 def test_the_director_of_a_generation_has_learned_what_its_scenarios_were_bred_from(
     tmp_path: Path,
 ) -> None:
-    plan = SearchPlan(map=MAP, genome=GENOME, seed=1, population=4)
+    plan = SearchPlan(map=MAP, genome=GENOME, seed=1, flights=16, population=4)
     job = dataclasses.replace(job_of(Good, tmp_path), npcs=policy_spec("graded"))
     ledger = Ledger.create(tmp_path / "ledger.sqlite", {})
     ledger.add_search("s", "m:S", "court", 16, job.dumps())
@@ -204,7 +204,7 @@ def test_the_director_of_a_generation_has_learned_what_its_scenarios_were_bred_f
 
 def test_a_search_that_was_killed_goes_on_with_the_same_scenarios(tmp_path: Path) -> None:
     whole = searched(tmp_path / "whole.sqlite", "garl", 40)
-    plan = SearchPlan(map=MAP, genome=GENOME, seed=1, population=8)
+    plan = SearchPlan(map=MAP, genome=GENOME, seed=1, flights=40, population=8)
     wanted = {generation: range(8) for generation in range(5)}
     part = Ledger.create(tmp_path / "part.sqlite", {})
     part.add_search("s", "m:S", "court", 40, "{}")

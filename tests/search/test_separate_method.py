@@ -34,12 +34,12 @@ def test_it_knows_the_flights_of_an_archive() -> None:
         for each in made
     )
     remembering = dataclasses.replace(plan(), known=known)
-    here = bred(make_method("garl", remembering), 2)
+    here = bred(make_method("garl", remembering), 4)
     with MethodProcess() as process:
         there = SeparateMethod(process, "court", "garl", remembering)
-        assert bred(there, 2) == here
+        assert bred(there, 4) == here
         assert any("archived-" in name for each in there.origins for name in each.parents)
-    assert here != bred(make_method("garl", plan()), 2)
+    assert here != bred(make_method("garl", plan()), 4)
 
 
 def test_searches_share_the_process() -> None:

@@ -23,7 +23,7 @@ from tests.support.results import flight_result
 COURT = load_map("court")
 GENOME = genome_of(domain_named("field"), COURT)
 DENSE = genome_of(domain_named("field"), COURT, is_dense=True)
-PLAN = SearchPlan(map=COURT, genome=GENOME, seed=4, population=20)
+PLAN = SearchPlan(map=COURT, genome=GENOME, seed=4, flights=100, population=20)
 BIT = "active."
 NPCS = {name for name, _ in COURT.present_objects}
 

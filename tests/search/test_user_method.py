@@ -14,7 +14,7 @@ from pytest_garl.search.methods.random import RandomSearch
 from tests.support.results import flight_result
 
 LAWN = load_map("lawn")
-PLAN = SearchPlan(map=LAWN, genome=genome_for(LAWN), seed=0, population=2)
+PLAN = SearchPlan(map=LAWN, genome=genome_for(LAWN), seed=0, flights=8, population=2)
 
 
 class Own(RandomSearch):

@@ -195,6 +195,7 @@ class Searches:
             map=map,
             genome=genome,
             seed=self.options.seed,
+            flights=self.options.budget,
             population=self.options.population,
             known=own.known,
             suspects=own.suspects,

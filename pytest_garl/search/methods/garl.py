@@ -1,14 +1,16 @@
 """garl: scenarios evolve in a model of the landing system, and the most promising ones are flown.
 
 The first generation is plain random scenarios of the domain: the control, to which the rest of the
-search is compared.  After it a generation has two parts:
+search is compared.  What is left of the flights has two halves:
 
-- children, bred in a model that is fitted to the flights so far (``search/evolution.py``): whole
-  conditions and NPCs of two flown scenarios;
-- stratified scenarios, without parents (``search/exploration.py``), in strata without NPCs, with
-  careless ones and with those that know of the UAV.  A bandit divides them among the strata.  The
-  first violation of a kind counts as a success and each further one less.  They bring conditions
-  into the search that the model has not seen.
+- first stratified scenarios, without parents (``search/exploration.py``), in strata without NPCs,
+  with careless ones and with those that know of the UAV.  A bandit divides them among the strata.
+  The first violation of a kind counts as a success and each further one less.  They show the model
+  every condition;
+- then children, bred in a model that is fitted to the flights so far (``search/evolution.py``):
+  whole conditions and NPCs of two flown scenarios.
+
+In turns from the start children cost more than they found: of few flights the model knows little.
 
 The second generation waits for the control.  From then on a generation is bred while the one before
 it is flown, from the results of those before that: no worker waits for the last flight of a
@@ -75,7 +77,8 @@ class GarlParameters:
     """
 
     bred_share: float = 0.5
-    """Share of the flights after the control that are children; all others are stratified."""
+    """Share of the flights after the control that are children, the last ones; all before them are
+    stratified."""
     replayed_share: float = 0.25
     """Largest share of a generation whose scenarios failed in another search."""
     shuffled: bool = False
@@ -144,15 +147,11 @@ class Garl:
         return [scenario for scenario, _ in made]
 
     def _is_bred(self, place: int) -> bool:
-        """Whether a place in a generation is a child's: of the first n places a share is, always.
-
-        The last generation of a search may be flown in part.
-        """
-        before, after = (
-            math.ceil(self._parameters.bred_share * count - ROUNDING)
-            for count in (place, place + 1)
-        )
-        return after > before
+        """Whether a place in this generation is a child's: the last ones of the search are."""
+        plan = self._plan
+        bred = math.ceil(self._parameters.bred_share * (plan.flights - plan.population) - ROUNDING)
+        number = self._generation * plan.population + place
+        return plan.flights - bred <= number < plan.flights
 
     def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Keep the flights for the generation after the next; return proximities to a violation."""

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any
@@ -27,7 +28,7 @@ from tests.support.results import flight_result
 
 MAP = load_map("court")
 GENOME = genome_of(domain_named("field"), MAP)
-PLAN = SearchPlan(map=MAP, genome=GENOME, seed=0, population=20)
+PLAN = SearchPlan(map=MAP, genome=GENOME, seed=0, flights=120, population=20)
 
 
 def signatures(method: Any, generations: int) -> Counter[str]:
@@ -70,24 +71,31 @@ def flown(generations: int, plan: SearchPlan = PLAN, **parameters: Any) -> list[
 
 
 @pytest.mark.parametrize("share", [0.5, 0.6, 1.0])
-@pytest.mark.parametrize("population", [8, 20])
-def test_at_least_its_share_of_all_flights_after_the_control_is_bred(
-    share: float, population: int
+@pytest.mark.parametrize(("population", "budget"), [(8, 30), (20, 80)])
+def test_the_last_flights_are_bred_and_are_at_least_their_share_after_the_control(
+    share: float, population: int, budget: int
 ) -> None:
-    plan = dataclasses.replace(PLAN, population=population)
+    plan = dataclasses.replace(PLAN, flights=budget, population=population)
     made = flown(4, plan, bred_share=share)
-    hows = [origin.how for generation in made for _, origin in generation]
+    hows = [origin.how for generation in made for _, origin in generation][:budget]
     assert {*hows[:population]} == {"control"}
     later = hows[population:]
-    # However many of its last flights a search does without.
-    for count in range(1, len(later) + 1):
-        bred = later[:count].count("bred")
-        generations = -(-count // population)
-        assert share * count - 1e-9 <= bred < share * count + generations
+    bred = math.ceil(share * len(later) - 1e-9)
+    assert later == ["stratified"] * (len(later) - bred) + ["bred"] * bred
+
+
+def test_up_to_its_half_a_search_is_the_one_that_only_explores() -> None:
+    def texts(made: Sequence[Made]) -> list[str]:
+        return [dump_scenario(each) for generation in made for each, _ in generation]
+
+    # Of 120 flights 20 are the control.
+    ours, exploring = texts(flown(6)), texts(flown(6, bred_share=0))
+    assert ours[:70] == exploring[:70]
+    assert not {*ours[70:]} & {*exploring[70:]}
 
 
 def test_a_child_has_whole_conditions_and_npcs_of_each_of_its_parents() -> None:
-    made, columns = flown(5), Columns(GENOME)
+    made, columns = flown(6), Columns(GENOME)
     rows = {
         Slot(generation=g, index=i).id("court"): encode(scenario, GENOME)
         for g, generation in enumerate(made)
@@ -111,8 +119,8 @@ def test_a_child_has_whole_conditions_and_npcs_of_each_of_its_parents() -> None:
 
 
 def test_a_child_tells_what_the_model_expects_of_it() -> None:
-    children = [each for made in flown(4) for _, each in made if each.how == "bred"]
-    assert len(children) == 30
+    children = [each for made in flown(6) for _, each in made if each.how == "bred"]
+    assert len(children) == 50
     for child in children:
         assert {*child.expected} == {*SAFE_MARGINS}
         assert child.fails is not None
@@ -133,8 +141,8 @@ def test_a_shuffled_model_has_the_same_machinery_and_knows_nothing() -> None:
             method.tell(told(scenarios, results))
         return float(np.mean(expected[True]) - np.mean(expected[False]))
 
-    assert told_from_others() > 0.3
-    assert abs(told_from_others(shuffled=True)) < 0.1
+    assert told_from_others(bred_share=1) > 0.3
+    assert abs(told_from_others(bred_share=1, shuffled=True)) < 0.1
 
 
 def test_a_search_that_only_explores_breeds_nothing_and_flies_all_strata() -> None:

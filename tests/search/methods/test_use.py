@@ -24,6 +24,7 @@ PLAN = SearchPlan(
     map=MAP,
     genome=GENOME,
     seed=4,
+    flights=400,
     population=20,
     use=parse_use(use_text("field", [(GENOME, MAP)]), "use.toml"),
 )
