@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
 from lab.arms import arm_named
 from lab.faults.catalogue import FAULTS, PLACEBO, fault_named
 from lab.faults.fault import Fault
 from lab.judges.flights import named
-from lab.judges.intervals import Values, mean_of, over_clusters
+from lab.judges.intervals import Values, over_clusters
 from lab.one_search import Flown, flights_of, flown_by, plan_of
 from lab.table import ResultTable, Row
 from pytest_garl.landing_system import airframe_of
@@ -203,25 +204,18 @@ def flown_by_all_arms(rows: Sequence[Row]) -> tuple[list[Row], int]:
 
 def _shares(found: Found, lost: set[Any], arms: Sequence[str], control: int) -> str:
     lines = [
-        "Share of faults found, %, mean over seeds with Student's 95 % interval; flights to the "
-        f"find, of which the first {control} are the control.",
+        "Share of faults found, %, over all seeds; flights to the find, of which the first "
+        f"{control} are the control.",
         "",
         f"| arm | searches | {' | '.join(f'within {each}' for each in WITHIN)} | flights |",
-        f"| --- | ---: |{' --- |' * len(WITHIN)} ---: |",
+        f"| --- | ---: |{' ---: |' * len(WITHIN)} ---: |",
     ]
     for arm in arms:
         own = [key for key in found if key[0] == arm]
-        cells = [
-            mean_of(
-                [
-                    float(np.mean([_in_time(found, lost, key, most) for key in own if key[2] == s]))
-                    for s in sorted({key[2] for key in own})
-                ]
-            ).text(0, 100)
-            for most in WITHIN
-        ]
+        shares = [np.mean([_in_time(found, lost, key, most) for key in own]) for most in WITHIN]
+        cells = " | ".join(f"{100 * share:.0f}" for share in shares)
         flights = np.mean([found[key] for key in own])
-        lines.append(f"| {arm} | {len(own)} | {' | '.join(cells)} | {flights:.1f} |")
+        lines.append(f"| {arm} | {len(own)} | {cells} | {flights:.1f} |")
     return "\n".join(lines)
 
 
@@ -233,11 +227,11 @@ def _ratios(found: Found, lost: set[Any], rivals: Sequence[str], control: int) -
     lines = [
         f"{OURS} against each rival, paired by fault and seed, with 95 % intervals of a bootstrap "
         "over seeds and families: flights as a multiple, and flights fewer.  After the control: "
-        "without what the control found, and without its flights.",
+        "without what the control found, and without its flights; p of the exact sign test.",
         "",
         "| rival | pairs | flights, times | flights fewer | pairs after the control | times "
-        "| fewer |",
-        "| --- | ---: | --- | --- | ---: | --- | --- |",
+        "| fewer | earlier : later : alike | p |",
+        "| --- | ---: | --- | --- | ---: | --- | --- | --- | ---: |",
     ]
     for rival in rivals:
         cells: list[str] = []
@@ -252,7 +246,11 @@ def _ratios(found: Found, lost: set[Any], rivals: Sequence[str], control: int) -
                 over_clusters(own, other, families).text(),
                 over_clusters(own, other, families, difference=True).text(1),
             ]
-        lines.append(f"| {rival} | {' | '.join(cells)} |")
+        own, other, _ = paired(found, lost, rival)
+        earlier, later = int((own < other).sum()), int((own > other).sum())
+        alike = int((own == other).sum())
+        p = binomtest(earlier, earlier + later).pvalue if earlier + later else 1.0
+        lines.append(f"| {rival} | {' | '.join(cells)} | {earlier} : {later} : {alike} | {p:.4f} |")
     return "\n".join(lines)
 
 

@@ -215,7 +215,9 @@ def test_the_report_compares_all_pairs_and_those_after_the_control() -> None:
     assert "| random | 4 | 0.74 [" in text
     assert "| 17.5 [" in text
     assert "| 3 | 0.70 [" in text
-    assert "| garl | 4 | 25 [" in text
+    assert "| garl | 4 | 25 | 25 | 50 | 100 |" in text
+    # Earlier in two pairs (35 to 60, 55 to 100), alike in the others.
+    assert "| 2 : 0 : 2 | 0.5000 |" in text
     assert "Missed by random, with the number of seeds: mean (1)." in text
     assert "Missed by garl, with the number of seeds: none." in text
     assert "a find of the placebo, which has no fault, in 1 of 2." in text
