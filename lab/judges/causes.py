@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import weakref
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -143,9 +144,7 @@ class Inventory:
 
         def fails(scenario: Scenario) -> bool:
             self.beside += 1
-            flown = self.fly(self.fly.job, scenario)
-            flown.record.unlink(missing_ok=True)
-            verdict = flown.result.verdict
+            verdict = self.fly(self.fly.job, scenario).result.verdict
             return verdict.violation and verdict.cause == result.verdict.cause
 
         hit = find_colliding_object(violating.flight)
@@ -168,6 +167,11 @@ class CausesTask(Task):
         return named(arm=self.arm, system=self.system, seed=self.seed, flights=self.flights)
 
     @property
+    def group(self) -> str:
+        """The arms of a system and seed, which fly many scenarios alike."""
+        return named(system=self.system, seed=self.seed, flights=self.flights)
+
+    @property
     def map(self) -> str:
         """The map of its seed."""
         return MAPS[self.seed % len(MAPS)]
@@ -176,16 +180,15 @@ class CausesTask(Task):
         """Fly the search, and shrink its violations."""
         plan = plan_of(self.map, self.seed, self.flights)
         signatures, violations = set[str](), 0
-        with tempfile.TemporaryDirectory() as folder:
-            fly = flights_for(self.system, load_map(self.map), Path(folder))
-            inventory = Inventory(fly=fly)
-            for violating in self._violations(fly, plan.population):
-                if violating.number <= plan.population:
-                    continue
-                violations += 1
-                signatures.add(violating.flight.signature)
-                if violating.flight.result.verdict.violation_type != "V":
-                    inventory.add(violating)
+        fly = flights_of_group(self.system, self.map, self.group)
+        inventory = Inventory(fly=fly)
+        for violating in self._violations(fly, plan.population):
+            if violating.number <= plan.population:
+                continue
+            violations += 1
+            signatures.add(violating.flight.signature)
+            if violating.flight.result.verdict.violation_type != "V":
+                inventory.add(violating)
         return {
             **dataclasses.asdict(self),
             "map": self.map,
@@ -207,7 +210,6 @@ class CausesTask(Task):
                 flown = fly(fly.job, scenario) if scenario else None
                 if scenario and flown and flown.result.verdict.violation:
                     yield Violating(number=number, how="frozen", scenario=scenario, flight=flown)
-                    flown.record.unlink(missing_ok=True)
             return
         arm, plan = arm_named(self.arm), plan_of(self.map, self.seed, self.flights)
         latest: list[CompletedFlight] = []
@@ -238,6 +240,15 @@ class CausesTask(Task):
         for line in done.stdout.splitlines():
             told = json.loads(line)
             yield parse_scenario(told["scenario"]) if told["violates"] else None
+
+
+@functools.lru_cache(maxsize=1)
+def flights_of_group(system: str, map_name: str, group: str) -> Flights:
+    """Return the flights that the arms of a group share, in a folder that goes with them."""
+    folder = tempfile.TemporaryDirectory(prefix=group)
+    fly = flights_for(system, load_map(map_name), Path(folder.name))
+    weakref.finalize(fly, folder.cleanup)
+    return fly
 
 
 def work_tree() -> Path:

@@ -56,10 +56,15 @@ class Flights(Protocol):
 
 
 class OwnFlights:
-    """Flights of the simulator in this process; the records are kept in a folder."""
+    """Flights of the simulator in this process; the records are kept in a folder.
+
+    What is asked for again is not flown again: arms share scenarios.
+    """
 
     def __init__(self, system: type, map: Map, folder: Path) -> None:
-        self._system, self._map, self._flown = system, map, 0
+        self._system, self._map = system, map
+        self._known: dict[tuple[PolicySpec, Scenario], CompletedFlight] = {}
+        self._twins: dict[Scenario, list[FlightResult]] = {}
         self.job = FlightJob.for_system(
             reference_to(system), map, policy_spec(GRADED), flights=folder
         )
@@ -67,15 +72,22 @@ class OwnFlights:
 
     def __call__(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
         """Fly a scenario as a job says, and save the record."""
-        self._flown += 1
-        flight = FlightId(search=search_key(str(self._flown)), map=job.map)
-        result, sha256, _ = fly_job(job, scenario, flight, None)
-        return CompletedFlight(result=result, sha256=sha256, record=job.record(flight))
+        if (job.npcs, scenario) not in self._known:
+            flight = FlightId(search=search_key(str(len(self._known))), map=job.map)
+            result, sha256, _ = fly_job(job, scenario, flight, None)
+            self._known[job.npcs, scenario] = CompletedFlight(
+                result=result, sha256=sha256, record=job.record(flight)
+            )
+        return self._known[job.npcs, scenario]
 
     def twins(self, scenario: Scenario) -> Iterator[FlightResult]:
         """Fly the twins, one after the other."""
-        for map in moved(self._map):
-            yield judged(fly(scenario, self._system, self.job.npcs, map=map), DEFAULT_LIMITS)
+        if scenario not in self._twins:
+            self._twins[scenario] = [
+                judged(fly(scenario, self._system, self.job.npcs, map=map), DEFAULT_LIMITS)
+                for map in moved(self._map)
+            ]
+        yield from self._twins[scenario]
 
 
 class StandInFlights:
@@ -112,16 +124,12 @@ def flights_for(system: str, map: Map, folder: Path) -> Flights:
 def fly_each(
     fly: Flights, latest: list[CompletedFlight], npcs: PolicySpec, scenarios: Sequence[Scenario]
 ) -> Iterator[Flown]:
-    """Yield the flights of scenarios; ``latest`` holds the one that was just yielded.
-
-    Its record is kept until the next one is asked for.
-    """
+    """Yield the flights of scenarios; ``latest`` holds the one that was just yielded."""
     for scenario in scenarios:
         flown = fly(dataclasses.replace(fly.job, npcs=npcs), scenario)
         latest[:] = [flown]
         record = load(flown.record) if flown.record.exists() else None
         yield Flown(result=flown.result, record=record)
-        flown.record.unlink(missing_ok=True)
 
 
 def moved(map: Map) -> Iterator[Map]:

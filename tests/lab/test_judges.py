@@ -330,6 +330,20 @@ def test_two_of_four_twins_confirm_a_cause(violating: int, confirmed: bool, tmp_
     assert inventory.unconfirmed == (0 if confirmed else causes.MOST_ASKED)
 
 
+def test_arms_share_the_flights_of_their_group(tmp_path: Path) -> None:
+    fly = TinyFlights(tmp_path)
+    first = fly(fly.job, nominal(fog=0.4))
+    assert fly(fly.job, nominal(fog=0.4)) is first
+    other = fly(dataclasses.replace(fly.job, npcs=policy_spec("waypoint")), nominal(fog=0.4))
+    assert first.record != other.record
+    assert {each.name for each in tmp_path.iterdir()} == {first.record.name, other.record.name}
+    tasks = causes.tasks(["garl", "exploring+"], ["opencv", "mm"], [23], 400)
+    assert [each.group for each in tasks] == ["opencv-23-400"] * 2 + ["mm-23-400"] * 2
+    group = causes.flights_of_group("ordinary", "lawn", "a")
+    assert causes.flights_of_group("ordinary", "lawn", "a") is group
+    assert causes.flights_of_group("ordinary", "lawn", "b") is not group
+
+
 @pytest.mark.parametrize("arm", ["garl", "random"])
 def test_a_search_of_the_stand_in_has_causes_beyond_its_control(arm: str) -> None:
     task = CausesTask(arm=arm, system="ordinary", seed=204, flights=60)
