@@ -67,7 +67,7 @@ def main() -> None:
     tasks = tasks_of(judge, named, table)
     if named.report:
         collect(tasks, named.folder, table)
-        print(judge.report(table.rows()))
+        print(judge.report([row for row in table.rows() if int(row["seed"]) in named.seeds]))
         return
     if judge is causes and FROZEN in named.arms:
         causes.make_work_tree()
