@@ -10,7 +10,8 @@ search is compared.  What is left of the flights has two halves:
 - then children, bred in a model that is fitted to the flights so far (``search/evolution.py``):
   whole conditions and NPCs of two flown scenarios.
 
-In turns from the start children cost more than they found: of few flights the model knows little.
+Bred in turns with draws from the start on, children cost more than they found: after few flights
+the model knows little.
 
 The second generation waits for the control.  From then on a generation is bred while the one before
 it is flown, from the results of those before that: no worker waits for the last flight of a
