@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from typing import Any
 
 from pytest_garl.execution.fly_and_judge import judged
 from pytest_garl.execution.reference import Reference
@@ -32,9 +33,8 @@ def main(system: str, map_name: str, seed: int, flights: int, population: int) -
     map = load_map(map_name)
     genome = genome_of(domain_named("field"), map)
     # That commit plans without the number of flights.
-    plan = SearchPlan(  # type: ignore[call-arg]
-        map=map, genome=genome, seed=seed, population=population
-    )
+    task: dict[str, Any] = {"map": map, "genome": genome, "seed": seed, "population": population}
+    plan = SearchPlan(**task)
     method, npcs, flown = Garl(plan, EXPLORING), policy_spec("graded"), 0
     while flown < flights:
         told = []

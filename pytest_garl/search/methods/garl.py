@@ -5,8 +5,8 @@ search is compared.  What is left of the flights has two halves:
 
 - first stratified scenarios, without parents (``search/exploration.py``), in strata without NPCs,
   with careless ones and with those that know of the UAV.  A bandit divides them among the strata.
-  The first violation of a kind counts as a success and each further one less.  They show the model
-  every condition;
+  The first violation of a kind counts as a success and each further one less.  They bring the
+  conditions into the search that the model learns of;
 - then children, bred in a model that is fitted to the flights so far (``search/evolution.py``):
   whole conditions and NPCs of two flown scenarios.
 

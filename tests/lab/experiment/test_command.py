@@ -138,7 +138,7 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
 def test_a_shorter_search_of_equal_population_is_the_beginning_of_a_longer_one(
     project: Path,
 ) -> None:
-    # But for garl, which breeds the second half of its budget.
+    # But for garl, whose children begin at a flight that depends on the budget.
     flown = []
     for budget in (12, 8):
         change(project, 'methods = ["garl", "random"]', 'methods = ["garl-paper"]')
