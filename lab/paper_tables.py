@@ -155,16 +155,18 @@ def _methods(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
 def _paired(experiment: Experiment, rows: Sequence[ResultRow]) -> str:
     """Return methods less their rivals, paired by map and seed; empty without pairs.
 
-    The paper's method has the rivals of the paper, ``garl`` those of a grid of its own, whose
-    first, with learned NPCs, is compared with those written by hand as well.
+    The paper's method has the rivals of the paper, ``garl`` those of a grid of its own.  The first
+    of these, with learned NPCs, is compared with the others as well, and the last, with the NPCs
+    that the paper's authors trained, with those that this code trained as the paper says.
     """
     found = {(row.map, row.method, row.seed): row for row in rows if row.system == "MM-MLS"}
     _, papers, own_rivals = experiment.grids
-    learned, *by_hand = own_rivals.methods
+    learned, *others = own_rivals.methods
     rivals = [
         *((papers, OWN, each) for each in papers.methods if each != OWN),
         *((own_rivals, "garl", each) for each in own_rivals.methods),
-        *((own_rivals, learned, each) for each in by_hand),
+        *((own_rivals, learned, each) for each in others),
+        (own_rivals, "surrogate-random", others[-1]),
     ]
     lines = []
     for grid, own, rival in rivals:
