@@ -95,8 +95,7 @@ def fly_experiment(
     for number, run in enumerate(left, start=total - len(left) + 1):
         folder = folders.runs / run.folder
         tell(f"run {number} of {total}: {run.title}")
-        # Wait for another process that flies the same run.
-        with locked(folder):
+        with locked(folder, functools.partial(tell, f"    another process flies it: {folder}")):
             if run in missing_runs(experiment, read_rows(folders.rows)):
                 rows = _fly_run(run, folder, workers)
                 append_rows(folders.rows, rows)

@@ -6,7 +6,7 @@ import contextlib
 import os
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from pytest_garl.errors import SavingError
@@ -51,10 +51,11 @@ def check_writable(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path, tell_of_wait: Callable[[], None] | None = None) -> Iterator[None]:
     """Lock a folder, so that one process at a time reads and then changes its files.
 
-    Raises SavingError if there is no such folder and none can be made.
+    ``tell_of_wait`` is called if another process has it.  Raises SavingError if there is no such
+    folder and none can be made.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -69,7 +70,12 @@ def locked(folder: Path) -> Iterator[None]:
     import fcntl
 
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if tell_of_wait:
+                tell_of_wait()
+            fcntl.flock(handle, fcntl.LOCK_EX)
         _remove_incomplete(folder)
         yield
     finally:

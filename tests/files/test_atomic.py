@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import threading
 import time
 from pathlib import Path
 
@@ -28,6 +29,21 @@ def test_locked_writers_lose_nothing(tmp_path: Path) -> None:
         process.join()
     assert path.read_text() == "40"
     assert [each.name for each in path.parent.iterdir()] == ["count"]
+
+
+def test_who_waits_is_told(tmp_path: Path) -> None:
+    told = threading.Event()
+
+    def second() -> None:
+        with locked(tmp_path, told.set):
+            pass
+
+    with locked(tmp_path, told.set):
+        assert not told.is_set()
+        thread = threading.Thread(target=second)
+        thread.start()
+        assert told.wait(60)
+    thread.join()
 
 
 def test_line_ends_stay_as_they_are(tmp_path: Path) -> None:
