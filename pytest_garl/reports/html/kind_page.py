@@ -226,11 +226,11 @@ def _unusual(task: FlightTask) -> Fact:
 
 def _facts(plan: KindPlan) -> tuple[Fact, ...]:
     kind, search, case = plan.kind, plan.search, plan.case
-    shows_shrunk = case is not None and case.is_shrunk and _shows_case(plan)
-    severity = case.severity if case and _shows_case(plan) else plan.task.result.severity
-    label, text = ("It took", severity.text if severity else "")
-    if not shows_shrunk:
-        label, text = _unusual(plan.task)
+    shown = case if _shows_case(plan) else None
+    severity = shown.severity if shown else plan.task.result.severity
+    shows_shrunk, whose = shown is not None and shown.is_shrunk, "" if shown else " (saved case)"
+    took = "It took", severity.text if severity else ""
+    label, text = took if shows_shrunk else _unusual(plan.task)
     means = grade_in_words(severity.grade) if severity and severity.grade else ""
     least, _, least_text = kind.least.partition(": ")
     is_told = shows_shrunk or kind.severest == plan.task.name
@@ -240,10 +240,10 @@ def _facts(plan: KindPlan) -> tuple[Fact, ...]:
         (label, f"{text} ({means})" if text and means else text),
         (_capitalised(least), "" if is_told else least_text),
         ("Found in", f"{flights}; {seen}" if seen else flights),
-        ("Robustness", case.robustness if case else ""),
-        ("Preventable?", case.prevention.text if case else ""),
+        (f"Robustness{whose}", case.robustness if case else ""),
+        (f"Preventable?{whose}", case.prevention.text if case else ""),
         ("Why it gates nothing", NO_GATE_TEXTS[case.reason] if case and case.reason else ""),
-        ("Shrinking removed", case.removed if case and case.is_shrunk else ""),
+        (f"Shrinking removed{whose}", case.removed if case and case.is_shrunk else ""),
         ("Saved case", _status(plan.saved) if plan.saved else "none in this project"),
     )
 

@@ -120,6 +120,8 @@ def test_what_shrinking_removed_agrees_with_what_the_page_says_it_took(run: Path
     page = html.unescape(kind_page(run))
     assert "nothing unusual" in page
     assert "1 of 2 conditions, not the marker's place" in page
+    # The page shows the first flight.
+    assert "Shrinking removed (saved case)" in page
     assert '<span class="tag">saved case, shrunk' in pages(run)["index.html"]
 
 
