@@ -64,8 +64,8 @@ def network_of(file: Path) -> Network:
     import torch
 
     saved = torch.load(file, map_location="cpu", weights_only=True)
-    layers = [
-        tuple(saved[f"fc.{layer}.{part}"].double().numpy() for part in ("weight", "bias"))
-        for layer in (0, 2)
-    ]
-    return Network(state="paper", layers=tuple((weight, bias) for weight, bias in layers))
+    layers = (
+        (saved[f"fc.{number}.weight"].double().numpy(), saved[f"fc.{number}.bias"].double().numpy())
+        for number in (0, 2)
+    )
+    return Network(state="paper", layers=tuple(layers))
