@@ -228,7 +228,7 @@ def session(
 
 
 def pretend(monkeypatch: pytest.MonkeyPatch, problem: str = "") -> list[str]:
-    """Let films be drawn at once; return the names of those that were asked for."""
+    """Let films be drawn at once, on two cores; return the names of those that were asked for."""
     asked: list[str] = []
 
     def draw(tasks: Any, workers: int) -> list[str]:
@@ -240,6 +240,7 @@ def pretend(monkeypatch: pytest.MonkeyPatch, problem: str = "") -> list[str]:
         return [problem for _ in tasks]
 
     monkeypatch.setattr("pytest_garl.reports.films.draw_films", draw)
+    monkeypatch.setattr("pytest_garl.reports.html.page_workers.cores", lambda: 2)
     return asked
 
 
