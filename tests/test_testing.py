@@ -483,10 +483,10 @@ def test_check_flies_no_probes_of_a_system_that_does_not_land() -> None:
 
 def test_what_the_computing_time_leaves_unflown_is_named() -> None:
     plan = testing.plan_for(map="lawn")
-    short = testing._Checker(Climbs, dataclasses.replace(plan, probes=True, limit_s=0.5)).run()
+    short = testing._Checker(Climbs, dataclasses.replace(plan, probes=True, limit_s=0.01)).run()
     (text,) = (each for each in short.warnings if each.startswith("stopped"))
     assert text == (
-        "stopped after 0.5 s of computing; not flown: clear air, another scenario and both again, "
+        "stopped after 0.01 s of computing; not flown: clear air, another scenario and both again, "
         "the probes"
     )
     assert str(short).startswith(
