@@ -57,7 +57,7 @@ layers: $(READY)
 # Four processes on two cores: many a test waits for a hang, for a clock or for another process.
 # Cases that gate nothing are flown by `test-long`, which flies all saved cases.
 tests: $(COMPILED)
-	$(BIN)/pytest -n 4 --dist=worksteal -m "not ray and not long and not garl_gates_nothing" --durations=15 \
+	$(BIN)/pytest -n 4 --dist=worksteal -m "not ray and not long and not garl_gates_nothing" --durations=15 -rs \
 	    tests landing_systems
 
 # PyTorch, which only training needs, is not installed there: its tests skip.
