@@ -12,7 +12,7 @@ import sys
 import tempfile
 import weakref
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -54,6 +54,7 @@ TABLE = ResultTable(
 )
 _NUMBER = re.compile(r"-\d+$")
 Cause = frozenset[str]
+Counts = dict[str, dict[tuple[str, str], int]]  # of each arm, by seed and system
 
 
 def cause_in(scenario: Scenario) -> Cause:
@@ -287,13 +288,15 @@ def report(rows: Sequence[Row]) -> str:
         return "nothing is flown"
     arms = list(dict.fromkeys(row["arm"] for row in rows))
     counts, smallest = (
-        {arm: {(r["seed"], r["system"]): count(r) for r in rows if r["arm"] == arm} for arm in arms}
-        for count in (_count, _smallest)
+        {
+            a: {(r["seed"], r["system"]): len(of(_first(r))) for r in rows if r["arm"] == a}
+            for a in arms
+        }
+        for of in (set, _minimal)
     )
     lines = [
-        "Distinct confirmed causes of a search; differences and ratios to garl over pairs of seed "
-        "and system, with 95 % intervals; p of the test that flips signs.  Smallest are those that "
-        "contain no other cause of the search.",
+        "Distinct confirmed causes of a search; to garl over pairs of seed and system; intervals of "
+        "95 %; p of the test that flips signs.  The smallest contain no other cause of the search.",
         "",
         "| arm | searches | causes | violations | signatures | garl less it | garl, times | p "
         "| smallest | garl less it | garl, times | p |",
@@ -311,22 +314,22 @@ def report(rows: Sequence[Row]) -> str:
             *_against(smallest, arm),
         ]
         lines.append(f"| {arm} | {' | '.join(cells)} |")
-    lines += ["", *_by_system(rows, arms), "", _by_origin(rows)]
-    commits = ", ".join(sorted({row["commit"] for row in rows}))
-    return "\n".join([*lines, "", f"Flown at {commits}."])
+    lines += ["", *_by_system(counts), "", _by_half(rows)]
+    commits = sorted({row["commit"] for row in rows})
+    return "\n".join([*lines, "", f"Flown at {', '.join(commits)}."])
 
 
-def _count(row: Row) -> float:
-    return float(row["count"])
+def _first(row: Row) -> dict[Cause, int]:
+    """Return the causes of a search, and the flight that shows each first."""
+    return {frozenset(c["cause"]): c["number"] for c in reversed(json.loads(row["causes"]))}
 
 
-def _smallest(row: Row) -> float:
-    found = {frozenset(each["cause"]) for each in json.loads(row["causes"])}
+def _minimal(found: Collection[Cause]) -> set[Cause]:
     # A violation that takes no condition is a cause of its own, not a part of each other one.
-    return sum(not any(other < each for other in found if other) for each in found)
+    return {each for each in found if not any(other < each for other in found if other)}
 
 
-def _against(counts: dict[str, dict[tuple[str, str], float]], arm: str) -> list[str]:
+def _against(counts: Counts, arm: str) -> list[str]:
     ours = counts.get(OURS, {})
     pairs = [(ours[key], value) for key, value in counts[arm].items() if key in ours]
     if arm == OURS or len(pairs) < 2:
@@ -340,21 +343,21 @@ def _against(counts: dict[str, dict[tuple[str, str], float]], arm: str) -> list[
     ]
 
 
-def _by_system(rows: Sequence[Row], arms: Sequence[str]) -> list[str]:
-    systems = list(dict.fromkeys(row["system"] for row in rows))
-    lines = [f"| system | {' | '.join(arms)} |", f"| --- |{' ---: |' * len(arms)}"]
-    for system in systems:
-        own = [[_count(r) for r in rows if (r["arm"], r["system"]) == (a, system)] for a in arms]
-        cells = [f"{np.mean(each):.1f}" if each else "–" for each in own]
+def _by_system(counts: Counts) -> list[str]:
+    lines = [f"| system | {' | '.join(counts)} |", f"| --- |{' ---: |' * len(counts)}"]
+    for system in dict.fromkeys(system for own in counts.values() for _, system in own):
+        alike = [[n for (_, each), n in own.items() if each == system] for own in counts.values()]
+        cells = [f"{np.mean(each):.1f}" if each else "–" for each in alike]
         lines.append(f"| {system} | {' | '.join(cells)} |")
     return lines
 
 
-def _by_origin(rows: Sequence[Row]) -> str:
-    parts = []
-    for arm in dict.fromkeys(row["arm"] for row in rows):
-        hows = Counter(
-            each["how"] for row in rows if row["arm"] == arm for each in json.loads(row["causes"])
-        )
-        parts.append(f"{arm} " + ", ".join(f"{how} {count}" for how, count in sorted(hows.items())))
-    return f"Which flights showed confirmed causes: {'; '.join(parts)}."
+def _by_half(rows: Sequence[Row]) -> str:
+    """Say how many causes are first shown before the children's half of the flights, and in it."""
+    told = {row["arm"]: np.zeros(3, dtype=int) for row in rows}
+    for row in rows:
+        first, half = _first(row), (int(row["control"]) + int(row["flights"])) / 2
+        later = {cause for cause, number in first.items() if number > half}
+        told[row["arm"]] += len(first) - len(later), len(later), len(later & _minimal(first))
+    parts = [f"{arm} {', '.join(map(str, counts))}" for arm, counts in told.items()]
+    return f"Causes before the children's half; new in it; smallest of these: {'; '.join(parts)}."

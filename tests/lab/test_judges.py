@@ -356,18 +356,27 @@ def test_a_search_of_the_stand_in_has_causes_beyond_its_control(arm: str) -> Non
 
 
 def cause_rows(arm: str, counts: dict[tuple[str, str], int]) -> list[Any]:
-    found = ConfirmedCause(
-        cause=frozenset({"fog"}), kind="I", signature="I", number=30, how="bred", twins=4
-    )
+    found = [
+        ConfirmedCause(
+            cause=frozenset({f"fog {number}"}),
+            kind="I",
+            signature="I",
+            number=number,
+            how="bred",
+            twins=4,
+        )
+        for number in range(208, 217)
+    ]
     return [
         {
             "arm": arm,
             "system": system,
             "seed": seed,
-            "count": str(count),
+            "control": "20",
+            "flights": "400",
             "violations": "40",
             "signatures": "9",
-            "causes": json.dumps([found.to_json()] * count),
+            "causes": json.dumps([each.to_json() for each in found[:count]]),
             "commit": "0123456789",
         }
         for (seed, system), count in counts.items()
@@ -385,7 +394,7 @@ def test_the_report_pairs_arms_by_seed_and_system() -> None:
     assert "| 1.41 [" in text
     assert "| 0.002 |" in text
     assert "| exploring | 4 | 6.0 [6.0, 6.0] | 40.0 | 9.0 | 3.0 [3.0, 3.0] | 1.50 [" in text
-    assert "garl bred 90" in text
+    assert "garl 30, 60, 60; exploring+ 30, 34, 34" in text
 
 
 def test_the_report_counts_apart_the_causes_that_contain_no_other() -> None:
@@ -394,7 +403,7 @@ def test_the_report_counts_apart_the_causes_that_contain_no_other() -> None:
     found = json.loads(row["causes"])
     for each, cause in zip(found, sets, strict=True):
         each["cause"] = cause
-    text = causes.report([{**row, "count": "4", "causes": json.dumps(found)}])
+    text = causes.report([{**row, "causes": json.dumps(found)}])
     assert "| garl | 1 | 4.0 | 40.0 | 9.0 | – | – | – | 3.0 | – | – | – |" in text
 
 
