@@ -295,8 +295,8 @@ def report(rows: Sequence[Row]) -> str:
         for of in (set, _minimal)
     )
     lines = [
-        "Distinct confirmed causes of a search; to garl over pairs of seed and system; intervals of "
-        "95 %; p of the test that flips signs.  The smallest contain no other cause of the search.",
+        "Distinct confirmed causes of a search; to garl over pairs of seed and system, with 95 % "
+        "intervals; p of the test that flips signs.  The smallest contain no other of the search.",
         "",
         "| arm | searches | causes | violations | signatures | garl less it | garl, times | p "
         "| smallest | garl less it | garl, times | p |",
