@@ -289,10 +289,10 @@ def report(rows: Sequence[Row]) -> str:
     arms = list(dict.fromkeys(row["arm"] for row in rows))
     counts, smallest = (
         {
-            a: {(r["seed"], r["system"]): len(of(_first(r))) for r in rows if r["arm"] == a}
+            a: {(r["seed"], r["system"]): len(kept(_shown(r))) for r in rows if r["arm"] == a}
             for a in arms
         }
-        for of in (set, _minimal)
+        for kept in (set, _minimal)
     )
     lines = [
         "Distinct confirmed causes of a search; to garl over pairs of seed and system, with 95 % "
@@ -319,8 +319,8 @@ def report(rows: Sequence[Row]) -> str:
     return "\n".join([*lines, "", f"Flown at {', '.join(commits)}."])
 
 
-def _first(row: Row) -> dict[Cause, int]:
-    """Return the causes of a search, and the flight that shows each first."""
+def _shown(row: Row) -> dict[Cause, int]:
+    """Return the causes that a search shows, and the flight that shows each first."""
     return {frozenset(c["cause"]): c["number"] for c in reversed(json.loads(row["causes"]))}
 
 
@@ -356,8 +356,8 @@ def _by_half(rows: Sequence[Row]) -> str:
     """Say how many causes are first shown before the children's half of the flights, and in it."""
     told = {row["arm"]: np.zeros(3, dtype=int) for row in rows}
     for row in rows:
-        first, half = _first(row), (int(row["control"]) + int(row["flights"])) / 2
-        later = {cause for cause, number in first.items() if number > half}
-        told[row["arm"]] += len(first) - len(later), len(later), len(later & _minimal(first))
+        shown, half = _shown(row), (int(row["control"]) + int(row["flights"])) / 2
+        later = {cause for cause, number in shown.items() if number > half}
+        told[row["arm"]] += len(shown) - len(later), len(later), len(later & _minimal(shown))
     parts = [f"{arm} {', '.join(map(str, counts))}" for arm, counts in told.items()]
     return f"Causes before the children's half; new in it; smallest of these: {'; '.join(parts)}."

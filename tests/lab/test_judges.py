@@ -398,13 +398,14 @@ def test_the_report_pairs_arms_by_seed_and_system() -> None:
 
 
 def test_the_report_counts_apart_the_causes_that_contain_no_other() -> None:
-    sets: list[list[str]] = [["fog"], ["fog", "rain"], ["dust", "light"], ["fog"], []]
+    sets: list[list[str]] = [["fog"], ["dust", "light"], [], ["fog"], ["fog", "rain"]]
     (row,) = cause_rows("garl", {("20", "opencv"): len(sets)})
     found = json.loads(row["causes"])
     for each, cause in zip(found, sets, strict=True):
         each["cause"] = cause
     text = causes.report([{**row, "causes": json.dumps(found)}])
     assert "| garl | 1 | 4.0 | 40.0 | 9.0 | – | – | – | 3.0 | – | – | – |" in text
+    assert "garl 3, 1, 0." in text
 
 
 # Judge 3
